@@ -177,4 +177,6 @@ class Bar:
         bar = '<div>{}</div><div role="toolbar" aria-label="Figures">{}</div><div>{}</div>'.format(
             *sides
         )
-        yield self._html, "content", f'<div class="ex-bar">{PRODUCT}{bar}</div>'
+        # With this scripts read lengths that are typed in another unit.
+        unit = f'data-unit-mm="{frame.state.design.unit_mm!r}"'
+        yield self._html, "content", f'<div class="ex-bar" {unit}>{PRODUCT}{bar}</div>'

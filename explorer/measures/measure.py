@@ -18,6 +18,7 @@ from explorer.measures.box import BoxStatics
 from explorer.measures.snapshot import PoseIndices
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics import number_text
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import has_limits
@@ -223,8 +224,6 @@ NEEDS: Mapping[str, tuple[str, Callable[[Case], bool]]] = {
 }
 """Words for what measures need, without an article, and whether a case has it."""
 
-POWERS = {1: "", 2: "²", 3: "³"}
-
 
 @dataclass(frozen=True)
 class Measure:
@@ -270,8 +269,11 @@ class Measure:
         """The title, or the label of a measure that has none."""
         return self.title or self.label
 
-    def unit_in(self, length: str) -> str:
-        """Return the unit for a unit of lengths, such as "mm"; "" for a plain number or a share."""
+    def unit_in(self, lengths: number_text.Unit, size: float = 0.0) -> number_text.Unit:
+        """Return the unit, given that of lengths; its name is "" for a plain number or a share.
+
+        The size, in design units, is that of `Unit.raised`.
+        """
         if self.power:
-            return f"{length}{POWERS[self.power]}"
-        return "" if self.unit == "share" else self.unit
+            return lengths.raised(self.power, size)
+        return number_text.Unit("" if self.unit == "share" else self.unit, 1.0)

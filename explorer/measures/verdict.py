@@ -34,7 +34,7 @@ from typing import Literal, NamedTuple
 
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.margins import INCIDENCES
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import Unit, format_number
 from explorer.singularity.colours import WARN_SHARE, warning_condition
 from explorer.singularity.strata import incidences
 
@@ -97,7 +97,7 @@ class Verdict(NamedTuple):
         """The verdict in words, such as "Near a singularity"."""
         return TITLES[self.kind]
 
-    def reason(self, unit_mm: float) -> str:
+    def reason(self, unit: Unit) -> str:
         """Return the reason, such as "2.5 mm of motion to the nearest singular pose, …"."""
         if self.kind == "singular":
             return "; ".join(f"δ{index} = 0: {INCIDENCES[index - 1]}" for index in self.incidences)
@@ -105,24 +105,22 @@ class Verdict(NamedTuple):
         if self.cause == "condition":
             return (
                 f"1/cond J is {format_number(self.condition, 2)}, most by δ{first}; δ{first} = 0 "
-                f"is {self._length(unit_mm)} of motion away"
+                f"is {unit.text(self.distance, 3)} of motion away"
             )
         is_motion = self.cause == "distance"
-        away = f"{self._length(unit_mm)} of motion" if is_motion else f"{self._turn()} of turning"
+        length = unit.text(self.distance, 3)
+        away = f"{length} of motion" if is_motion else f"{self._turn()} of turning"
         return f"{away} to the nearest singular pose, {INCIDENCES[first - 1]} (δ{first} = 0)"
 
-    def brief(self, unit_mm: float) -> str:
+    def brief(self, unit: Unit) -> str:
         """Return the verdict in a few words, such as "10.3 mm to δ1 = 0", "7° to δ2 = 0"."""
         names = " and ".join(f"δ{index} = 0" for index in self.incidences)
         if self.kind == "singular":
             return f"Singular: {names}"
         if self.cause == "condition":
             return f"1/cond J {format_number(self.condition, 2)}"
-        away = self._length(unit_mm) if self.cause == "distance" else self._turn()
+        away = unit.text(self.distance, 3) if self.cause == "distance" else self._turn()
         return f"{away} to δ{self.incidences[0]} = 0"
-
-    def _length(self, unit_mm: float) -> str:
-        return f"{format_number(self.distance * unit_mm, 3)} mm"
 
     def _turn(self) -> str:
         return f"{format_number(math.degrees(self.turn), 2)}°"

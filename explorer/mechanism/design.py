@@ -31,6 +31,7 @@ from explorer.mechanism.points import Variables, platform_points
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics import checks
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import Unit
 
 JOINTS = ("l1", "d1", "d2", "d3", "d4", "l4")
 """The joint variables, in the order of every array axis of six."""
@@ -259,6 +260,11 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def reach(self) -> float:
         """The reach |a3|, the normalising length, in design units."""
         return math.hypot(*self.a3)
+
+    @property
+    def millimetres(self) -> Unit:
+        """The millimetre as the unit in which lengths of this design are written."""
+        return Unit("mm", self.unit_mm)
 
     @property
     def tolerance(self) -> float:

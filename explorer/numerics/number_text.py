@@ -15,14 +15,63 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 # Powers of ten from which on, and below which, a number for people is written without one.
 LEAST_POWER, MOST_POWER = -4, 9
+POWERS = {1: "", 2: "²", 3: "³"}
+"""Signs of powers of units."""
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # Sizes from which on, and below which, a number that holds still is written without one.
 LEAST_SIZE, MOST_SIZE = 1e-3, 1e7
 # Share of its size up to which a number is a rounding error.
 ROUNDING = 1e-12
+
+
+class Unit(NamedTuple):
+    """A unit in which lengths or volumes are written for people.
+
+    Attributes:
+        name: Its name, such as "mm".
+        factor: Value of one design unit, or of its cube, in this unit.
+    """
+
+    name: str
+    factor: float
+
+    def convert(self, value: float) -> float:
+        """Return a value in this unit, given one in design units.
+
+        Of fifteen digits, so that 0.7 mm is read as the number that is written as 0.7 mm.
+        """
+        return value if self.factor == 1.0 else float(f"{value * self.factor:.15g}")
+
+    def read(self, value: float) -> float:
+        """Return a value in design units, given one in this unit, likewise."""
+        return value if self.factor == 1.0 else float(f"{value / self.factor:.15g}")
+
+    def text(self, value: float, digits: int = 4, *, size: float = 0.0) -> str:
+        """Return a value for people, given in design units as its size is."""
+        words = format_number(value * self.factor, digits, size=size * self.factor)
+        return f"{words} {self.name}"
+
+    def raised(self, power: int, size: float = 0.0) -> Unit:
+        """Return the unit of areas or volumes; of large volumes beside mm that is cm³.
+
+        Args:
+            power: Exponent of length, 1 to 3.
+            size: Magnitude of the volumes in design units.
+        """
+        if power == 1:
+            return self
+        cubic = (0.1 * self.factor) ** 3
+        if power == 3 and self.name == "mm" and size * cubic >= 1.0:
+            return Unit("cm³", cubic)
+        return Unit(f"{self.name}{POWERS[power]}", self.factor**power)
+
+
+UNITS = Unit("units", 1.0)
+"""The design unit itself."""
 
 
 def drop_rounding(value: float, size: float) -> float:

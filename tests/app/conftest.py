@@ -15,6 +15,7 @@ from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.server import Running, start
 from explorer.app.session.worker import Worker
 from explorer.app.state.state import open_state
+from explorer.app.state.view import View
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.buttons import Buttons
 from explorer.mechanism.design_file import PRESETS
@@ -36,7 +37,8 @@ def buttons(server: viser.ViserServer) -> Generator[Buttons]:
 
 @pytest.fixture
 def desk() -> Generator[Desk]:
-    made = Desk(open_state(PRESETS["paper-optimal"]))
+    # Controls then show what the state has.
+    made = Desk(open_state(PRESETS["paper-optimal"], view=View(lengths="design units")))
     yield made
     made.session.stop()
 

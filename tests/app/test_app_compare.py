@@ -57,6 +57,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Guide, Payload
 from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import Unit
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 
@@ -86,9 +87,9 @@ def columns(
     *pinned: Design, live: Design = OPTIMAL, millimetres: bool = False
 ) -> tuple[Column, ...]:
     """Return the columns of designs, all measured."""
-    unit = 1.0 if millimetres else live.unit_mm
+    name, unit = ("mm", 1.0) if millimetres else ("units", live.unit_mm)
     return tuple(
-        Column(number, design, measured(design), design.unit_mm / unit)
+        Column(number, design, measured(design), Unit(name, design.unit_mm / unit))
         for number, design in enumerate((live, *pinned))
     )
 
@@ -135,18 +136,19 @@ def test_actions_in_any_order_pin_at_most_three_designs_and_none_twice(
 @pytest.mark.parametrize("millimetres", [False, True])
 def test_table_shows_the_values_of_the_library(*, millimetres: bool) -> None:
     small = msgspec.structs.replace(INITIAL, unit_mm=12.0)
-    html = table(columns(small, variant(3), millimetres=millimetres), millimetres=millimetres)
+    html = table(columns(small, variant(3), millimetres=millimetres))
     rows = cells(html)
     # None of these designs has a load, limits of forces, or errors.
     assert len(rows) == sum(not measure.needs for measure in LISTED.values())
-    unit = "mm" if millimetres else "units"
+    unit, cubic = ("mm", "cm³") if millimetres else ("units", "units³")
+    large = 1e-3 if millimetres else 1.0
     for place, design in enumerate((OPTIMAL, small, variant(3))):
         factor = design.unit_mm / (1.0 if millimetres else OPTIMAL.unit_mm)
         nodes = workspace_nodes(design)
         expected = {
-            f"volume {unit}³": workspace_volume(design).volume * factor**3,
+            f"volume {cubic}": large * workspace_volume(design).volume * factor**3,
             "nodes": nodes.count,
-            f"node volume {unit}³": nodes.volume * factor**3,
+            f"node volume {cubic}": large * nodes.volume * factor**3,
             f"reach {unit}": design.reach * factor,
             f"b2 {unit}": design.b2 * factor,
             f"clearance {unit}": (measured(design)["least_clearance"] or 0.0) * factor,
@@ -171,7 +173,7 @@ def test_best_value_is_better_than_another() -> None:
     assert best_of(volume, [2.0, 2.0 * (1.0 + 1e-12)]) == set()
     assert best_of(volume, [2.0, None]) == set()
     assert best_of(nodes, [1.0, 2.0]) == set()
-    html = table(columns(INITIAL), millimetres=False)
+    html = table(columns(INITIAL))
     assert "7,053.04" in re.findall(r'is-best"[^>]*>([^<]*)', html)
 
 
@@ -179,13 +181,13 @@ def test_empty_workspace_of_a_name_with_markup_is_shown_with_its_reasons() -> No
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=(1.0, 2.0), l4=(1.0, 2.0))
     empty = msgspec.structs.replace(OPTIMAL, name="<b onclick=x>&", limits=limits)
     found = columns(empty)
-    html = table(found, millimetres=False)
+    html = table(found)
     rows = cells(html)
     assert rows["volume units³"][1] == "empty"
     assert rows["clearance units"][1] == "–"
     (note,) = notes(compared(empty), found)
     assert "A (&lt;b onclick=x&gt;&amp;) has an empty workspace; emptied by: " in note
-    assert "–" in bars(found, millimetres=False)
+    assert "–" in bars(found)
     assert "<b onclick" not in html + note
 
 
@@ -198,13 +200,15 @@ def test_same_manipulator_in_other_units_has_the_same_values_and_a_note() -> Non
         live, same = (column.value(measure) for column in found)
         expected = None if live is None else pytest.approx(live, rel=1e-6, abs=1e-9)
         assert same == expected, measure.name
-    (note,) = notes(compared(other), found)
-    assert "One unit of the live design is 10 mm; A has 5 mm. Lengths are in units" in note
+    state = compared(other)
+    assert notes(state, found) == []
+    (note,) = notes(Set("view.lengths", "design units").apply(state), found)
+    assert "in units of the live design, of 10 mm" in note
 
 
 def test_bars_are_as_long_as_their_values() -> None:
     found = columns(INITIAL, variant(2))
-    html = bars(found, millimetres=False)
+    html = bars(found)
     widths = [float(width) for width in re.findall(r"--share:([\d.]+)%", html)]
     per_drawing = np.array(widths).reshape(len(DRAWN), len(found))
     for name, drawn in zip(DRAWN, per_drawing, strict=True):
@@ -229,7 +233,7 @@ HEAVY = msgspec.structs.replace(LIGHT, name="heavy", payload=Payload(2.0, force_
 def test_table_of_a_singular_home_shows_infinite_loads_and_errors() -> None:
     home = Pose((10.0, 5.0, 0.0), OPTIMAL.home_pose.quaternion)
     singular = msgspec.structs.replace(HEAVY, home=home)
-    rows = cells(table(columns(singular, live=LIGHT), millimetres=True))
+    rows = cells(table(columns(singular, live=LIGHT, millimetres=True)))
     for name in ("load share at home %", "worst error at home mm", "worst turn at home °"):
         assert number(rows[name][0]) > 0.0
         assert rows[name][1] == "infinite"
@@ -238,7 +242,7 @@ def test_table_of_a_singular_home_shows_infinite_loads_and_errors() -> None:
 
 
 def test_table_compares_loads_of_the_designs_that_have_them() -> None:
-    html = table(columns(HEAVY, INITIAL, live=LIGHT), millimetres=True)
+    html = table(columns(HEAVY, INITIAL, live=LIGHT, millimetres=True))
     assert "nan" not in html
     assert "inf" not in re.sub("<.*?>", "", html)
     rows = cells(html)
@@ -252,9 +256,9 @@ def test_table_compares_loads_of_the_designs_that_have_them() -> None:
         ):
             assert number(rows[name][place]) == pytest.approx(expected, abs=0.01)
         assert rows["worst actuator at home"][place] == JOINTS[int(pose.shares[:6].argmax())]
-    assert {"worst error at home mm", "held volume mm³"} <= {*rows}
+    assert {"worst error at home mm", "held volume cm³"} <= {*rows}
     # A design without a machine has none of them.
-    assert rows["load share at home %"][2] == rows["held volume mm³"][2] == "–"
+    assert rows["load share at home %"][2] == rows["held volume cm³"][2] == "–"
 
 
 def test_drawing_has_the_workspace_at_home_and_the_points_of_the_design() -> None:

@@ -462,7 +462,7 @@ def test_undo_and_redo_are_those_of_the_session(running: Running, palette: Palet
 
 
 UNITS = re.compile(
-    r"design units|units³|\bunits\b|\bmm\b|millimetres|pixels|\(px\)|°|degrees|\(s\)|seconds"
+    r"design units|units³|cm³|\bunits\b|\bmm\b|millimetres|pixels|\(px\)|°|degrees|\(s\)|seconds"
     r"|kg/m³|\bstep\b|\bkg\b|\bN( m)?\b|\bGPa\b|\bMPa\b"
 )
 
@@ -482,6 +482,14 @@ OUT_OF_SIGHT = {"Presses on markup"}
 
 
 def test_control_has_a_hint_and_one_of_a_value_tells_its_unit(running: Running) -> None:
+    session, titles = running.page.session, ("Leg lengths (mm)", "Leg lengths (units)")
+    for lengths, title, other in (("design units", *titles[::-1]), ("mm", *titles)):
+        session.do(Set("view.lengths", lengths))
+        assert session.wait_until_idle()
+        words = {words for each in widgets(running.viser) for words in (*each.path, each.label)}
+        assert title in words
+        assert other not in words
+    assert not any(re.search(r"\b(?<!1 )units?\b", each) for each in words - {"1 unit (mm)"})
     found = [each for each in widgets(running.viser) if each.label not in OUT_OF_SIGHT]
     assert len(found) > 100
     for widget in found:

@@ -221,12 +221,12 @@ def test_slider_sets_a_fold_within_the_walls_of_the_mode_and_is_undone(
     assert (slider.min, slider.max, slider.value) == (0.0, 180.0, 45.0)
     desk.use(shown(panel, desk)["r"], 12.0)
     assert folds_of(desk.state)[0] == 12.0
-    assert desk.session.history.step.words == "r = 12"
+    assert desk.session.history.step.words == "r = 12 units"
 
 
 def stops_of(state: State, index: int) -> list[tuple[Rgb, float]]:
     """Return colours and shares of the stops of a track."""
-    text = colour_stops(Frame(state), index, fold_span(state, index))
+    text = colour_stops(Frame(state), index, fold_span(state, index).high)
     found = re.findall(r"#(..)(..)(..) ([\d.]+)%", text)
     return [((int(r, 16), int(g, 16), int(b, 16)), float(at) / 100.0) for r, g, b, at in found]
 

@@ -178,7 +178,7 @@ def test_change_after_undoing_is_a_new_step_even_at_once(recorder: Recorder) -> 
     recorder.move(-1)
     kept = recorder.history.step
     recorder.do(SetPosition(1, 3.0), 1)
-    assert recorder.words == ["x = 5", "y = 6", "y = 3"]
+    assert recorder.words == ["x = 50 mm", "y = 60 mm", "y = 30 mm"]
     assert recorder.history.steps[2] is kept
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
+from decimal import Decimal
 from typing import Any
 
 import msgspec
@@ -15,13 +17,16 @@ from hypothesis import given, strategies as st
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.feature import MachinePanel
 from explorer.app.features.mechanism.feature import DesignPanel, MovePanel
+from explorer.app.inputs.controls import in_unit, item
 from explorer.app.inputs.limits import limit_span, push_other_end
 from explorer.app.inputs.ranges import (
     Span,
     coordinate_span,
+    in_whole_steps,
     joint_span,
     length_span,
     position_span,
+    round_span,
     tint_marks,
     variable_span,
 )
@@ -32,6 +37,7 @@ from explorer.app.state.state import open_state
 from explorer.errors import DesignError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design, Limits
 from explorer.mechanism.design_file import PRESETS, decode_design
+from explorer.numerics.number_text import Unit
 from explorer.workspace.limits.table import LIMITS
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -112,6 +118,42 @@ def handles(panel: Any, desk: Desk, kind: type) -> dict[str, Any]:
         if isinstance(handle, kind):
             found[handle.label] = handle
     return found
+
+
+@given(
+    st.integers(-(10**6), 10**6).map(lambda count: Decimal(count) / 1000),
+    st.sampled_from(["10", "1", "25.4", "1e-6", "1e6"]),
+)
+def test_length_typed_in_mm_is_the_state_of_its_value_in_design_units(
+    value: Decimal, unit_mm: str
+) -> None:
+    design = msgspec.structs.replace(OPTIMAL, unit_mm=float(unit_mm))
+    in_mm = open_state(design)
+    in_units = Set("view.lengths", "design units").apply(in_mm)
+    bound = in_unit(item(lambda frame: frame.state.position, 0, SetPosition), 1)
+    typed = float(value * Decimal(unit_mm))
+    after = bound.write(in_mm, typed).apply(in_mm)
+    assert after.pose == bound.write(in_units, float(value)).apply(in_units).pose
+    assert bound.read(Frame(after)) == typed
+    # Neither the switch nor a value that is typed as it stands changes a bit.
+    assert replace(in_units, view=in_mm.view) == in_mm
+    joint = in_unit(item(lambda frame: frame.state.joints, 0, SetJoint), 1)
+    again = joint.write(in_mm, joint.read(Frame(in_mm)))
+    assert again == SetJoint(0, in_mm.joints[0])
+
+
+@given(st.floats(-1e3, 0.0), st.floats(1e-2, 1e3), st.floats(1e-6, 1e6))
+def test_range_in_mm_holds_that_in_design_units_in_whole_steps(
+    low: float, width: float, unit_mm: float
+) -> None:
+    step = 10.0 ** (math.floor(math.log10(width)) - 3)
+    span, unit = round_span(low, low + width, step), Unit("mm", unit_mm)
+    shown = in_whole_steps(span, unit)
+    room = 0.2 * shown.step
+    assert shown.low - room <= span.low * unit_mm
+    assert span.high * unit_mm <= shown.high + room
+    assert shown.high - shown.low <= span.high * unit_mm - span.low * unit_mm + 22.0 * shown.step
+    assert 0.099 * span.step * unit_mm <= shown.step <= 1.001 * span.step * unit_mm
 
 
 def test_track_only_grows_while_its_own_slider_moves(services: Services, desk: Desk) -> None:

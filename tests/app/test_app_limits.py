@@ -106,7 +106,7 @@ def test_limit_added_to_the_table_is_told_and_listed(leaning: Design) -> None:
     told = [str(each) for each in evaluate(leaning, beyond).violations]
     angle = leans(np.array(beyond.position))
     assert f"{NAME} = {angle:.4g}° is above its maximum 12°" in told
-    assert (NAME, "at most 12°") in list(limit_rows(leaning))
+    assert (NAME, "at most 12°") in list(limit_rows(leaning, UNITS))
     page = read(make_report(leaning).decode())
     assert "at most 12°" in table_of(page, "Limits in force")[NAME].text
 

@@ -30,6 +30,7 @@ from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.mechanism.machine import Actuators, Guide, Payload, Six, Struts, Tool
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import UNITS
 
 OPTIMAL = PRESETS["paper-optimal"]
 TURNED = Tool((1.0, -0.5, 2.5), (0.5, 0.5, -0.5, 0.5))
@@ -218,7 +219,7 @@ def test_limit_of_the_pull_alone_is_shown_and_kept(services: Services, desk: Des
     assert hand.controls["Limited forces"].value
     assert not hand.controls["Push of each (N)"].visible
     assert hand.controls["Pull of each (N)"].value == 90.0
-    assert "actuators pull up to 90 N" in machine_words(desk.state.design)
+    assert "actuators pull up to 90 N" in machine_words(desk.state.design, UNITS)
     assert hand.set("Limited forces", False).actuators == Actuators()
 
 
@@ -331,7 +332,7 @@ def test_tool_angles_of_a_design_that_is_opened_are_its_own(desk: Desk) -> None:
     ],
 )
 def test_machine_words_tell_what_it_carries_and_what_is_limited(design: Design, words: str) -> None:
-    assert machine_words(design) == words
+    assert machine_words(design, UNITS) == words
 
 
 def test_panel_tells_the_machine_the_weight_and_the_moment(hand: Hand, desk: Desk) -> None:
@@ -339,7 +340,7 @@ def test_panel_tells_the_machine_the_weight_and_the_moment(hand: Hand, desk: Des
         assert words in hand.show()
     desk.session.do(Open(PRESS))
     shown = hand.show()
-    assert machine_words(PRESS) in shown.replace("&nbsp;", " ")
+    assert machine_words(PRESS, UNITS) in shown.replace("&nbsp;", " ")
     assert "guide up to 200&nbsp;N and 6&nbsp;N&nbsp;m." in shown
     assert "19.61 N" in shown
     # Of a tube of 8 and 6 mm at 200 MPa: σ π (D⁴ − d⁴) / (32 D).

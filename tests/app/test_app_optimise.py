@@ -81,11 +81,13 @@ from explorer.app.state.actions import (
 )
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
+from explorer.app.state.view import View
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.box import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
+from explorer.numerics.number_text import UNITS
 from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate, compare_designs, curves_of
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
@@ -340,7 +342,7 @@ def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened
 ) -> None:
     notice = search_notice(found)
     assert notice is not None
-    assert (notice.title, notice.text) == ("Converged", "volume 8,000 units³")
+    assert (notice.title, notice.text) == ("Converged", "volume 8,000 cm³")
     assert notice.buttons == (ACCEPT, REVERT)
     assert (buttons_of(found)[ACCEPT], buttons_of(found)[REVERT]) == ("filled", "enabled")
     after = Accept().apply(found)
@@ -499,7 +501,7 @@ def test_limits_in_force_are_listed_and_no_others() -> None:
         swing=Swing(b4=40.0),
         leg_radii=(0.1, 0.1, 0.3, 0.1),
     )
-    assert dict(limit_rows(design)) == {
+    assert dict(limit_rows(design, UNITS)) == {
         "l1": "1.5 to 12",
         "d2, d4, l4": f"at most {design.reach:.5g} (the reach)",
         "d1, d3": "−3 to 20",
@@ -509,7 +511,7 @@ def test_limits_in_force_are_listed_and_no_others() -> None:
         "leg radii": "0.1 to 0.3",
     }
     free = limited(OPTIMAL, box=None, carriage_order="any", margin=None)
-    assert [row for row, _ in limit_rows(free)] == ["l1, d2, d4, l4"]
+    assert [row for row, _ in limit_rows(free, UNITS)] == ["l1, d2, d4, l4"]
 
 
 # What is shown
@@ -535,7 +537,10 @@ def test_table_shows_old_and_new_and_their_difference(found: State) -> None:
     run = run_of(found)
     assert run.comparison is not None
     before, after = run.comparison
-    rows = {row[0].partition(" ")[0]: row[1:] for row in rows_of(comparison_table(run))}
+    rows = {
+        row[0].partition(" ")[0]: row[1:]
+        for row in rows_of(comparison_table(run, View(lengths="design units")))
+    }
     volume = before["volume"] or 0.0
     assert [number(cell) for cell in rows["volume"]] == pytest.approx(
         [volume, 8000.0, 8000.0 - volume], abs=0.005

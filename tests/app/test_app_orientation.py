@@ -32,6 +32,7 @@ from explorer.app.state.view import WorkspaceView
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_from_rotation, tilt_torsion_of
+from explorer.numerics.number_text import UNITS
 from explorer.singularity.colours import css
 from explorer.workspace.orientations.share import cone_of_directions, orientation_share
 from explorer.workspace.orientations.tilts import (
@@ -203,7 +204,7 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
         assert feed.drawing is not None
         volumes[over] = feed.drawing.solid.volume
         assert volumes[over] == pytest.approx(make(OPTIMAL, rotations).volume, rel=1e-3)
-        assert bound in range_words(feed.drawing)
+        assert bound in range_words(feed.drawing, UNITS)
     assert volumes["total"] < volumes["inclusive"]
 
 

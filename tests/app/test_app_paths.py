@@ -42,12 +42,12 @@ from explorer.app.features.paths.panel import (
 )
 from explorer.app.features.paths.plots import (
     FOLDS,
-    MARGINS,
     LoadPlot,
     Quantity,
     crossing_time,
     crossing_words,
     incidence_columns,
+    margins_in,
 )
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Action, Set, SetPose, SetPosition, SetVariable
@@ -65,6 +65,7 @@ from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import UNITS
 from explorer.paths.loads import path_loads
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
@@ -143,7 +144,7 @@ def test_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
     assert end.pose == journey.poses[-1]
     assert end.mode == last
     assert end.joints == pytest.approx(joints, abs=1e-9)
-    words = crossing_words(journey)
+    words = crossing_words(journey, UNITS)
     for crossing in journey.margins.crossings:
         assert f"δ{crossing.incidence} = 0" in words
 
@@ -251,7 +252,9 @@ def margins_of(pose: Pose) -> FloatArray:
 
 
 @pytest.mark.parametrize(
-    ("quantity", "value_of"), [(MARGINS, margins_of), (FOLDS, folds_of)], ids=["margins", "folds"]
+    ("quantity", "value_of"),
+    [(margins_in(UNITS), margins_of), (FOLDS, folds_of)],
+    ids=["margins", "folds"],
 )
 @pytest.mark.parametrize(("first", "last"), [(0, 7), (1, 4), (1, 5)])
 def test_chart_shows_margins_or_folds_of_the_poses_over_time(
@@ -314,7 +317,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     assert not journey.margins.crossings
     least = np.array(journey.margins.least)
     closest = int(least.argmin())
-    assert f"|δ{closest + 1}| = {least[closest]:.3g}" in crossing_words(journey)
+    assert f"|δ{closest + 1}| = {least[closest]:.3g}" in crossing_words(journey, UNITS)
     inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
     positions, rotations = ([p.position for p in inner], [p.rotation for p in inner])
     assert poses_are_valid(state.design, np.array(positions), np.array(rotations)).all()
@@ -412,7 +415,7 @@ def test_end_is_the_present_pose_a_mode_or_six_numbers(
     def numbers() -> Pose:
         return ends_of(desk.state)[ENDS.index(end)]
 
-    typed = (f"{title} x, y, z", f"{title} angles (°)")
+    typed = (f"{title} x, y, z (units)", f"{title} angles (°)")
     assert not {*typed} & {*controls()}
     for mode, option in enumerate(MODES):
         desk.use(controls()[title], option)

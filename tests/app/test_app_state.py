@@ -75,7 +75,7 @@ def test_joint_that_cannot_close_keeps_the_pose_and_names_what_would_work(
     assert stuck.unclosed is not None
     assert stuck.unclosed.nearest == pytest.approx(high, rel=1e-6)
     assert stuck.unclosed.failing
-    assert JOINTS[joint] in str(stuck.unclosed)
+    assert JOINTS[joint] in stuck.unclosed.words(stuck.unit)
     freed = UseNearest().apply(stuck)
     assert freed.unclosed is None
     assert closes(freed)
@@ -170,7 +170,7 @@ def test_held_pose_or_held_legs_stay_while_the_design_changes(state: State, name
 
 
 def test_held_legs_that_cannot_be_assembled_refuse_the_design(state: State) -> None:
-    with pytest.raises(InputError, match=r"a3x = 80 cannot be assembled .* stays 19\.1829"):
+    with pytest.raises(InputError, match=r"a3x = 800 mm cannot be assembled .* stays 191\.829 mm"):
         SetVariable("a3x", 80.0).apply(Set("hold", "legs").apply(state))
 
 
@@ -252,7 +252,7 @@ def test_nearest_length_is_never_singular(design: Design, seed: int) -> None:
         assert frame.verdict.kind != "singular"
         assert len(frame.snapshot.bordering_modes) == 1
         assert frame.snapshot.mode == stuck.mode
-        reason = frame.verdict.reason(after.design.unit_mm)
+        reason = frame.verdict.reason(after.unit)
         assert after.remark is not None
         assert after.remark.endswith(f"short of it: {reason}.")
         assert ("nearest that stays clear," in after.remark) == (frame.verdict.kind == "clear")

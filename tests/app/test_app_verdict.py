@@ -31,6 +31,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import jacobian_factors
 from explorer.mechanism.margins import describe_modes
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
+from explorer.numerics.number_text import Unit
 from explorer.singularity.colours import SINGULAR, WARN_SHARE, WARNED, css, proximity_colour
 from explorer.singularity.strata import COVERED, OF_INCIDENCES, incidences
 from explorer.workspace.position_bands import position_bands
@@ -62,7 +63,7 @@ def test_nearest_singular_pose_is_the_boundary_of_two_modes(incidence: int) -> N
     found = frame.verdict
     assert (found.kind, found.incidences, found.distance) == ("singular", (incidence,), 0.0)
     assert found.levels[incidence - 1] == 0.0
-    assert found.brief(10.0) == f"Singular: δ{incidence} = 0"
+    assert found.brief(Unit("mm", 10.0)) == f"Singular: δ{incidence} = 0"
     first, second = frame.snapshot.bordering_modes
     assert second - first == 4 >> (incidence - 1)
     text = re.sub("<[^>]*>", " ", present_mode(frame))
@@ -139,9 +140,10 @@ def test_verdict_on_a_nearly_degenerate_design_names_the_conditioning_and_its_ma
     # The line b2b3 has hardly a length.
     assert found.incidences[0] == 2
     assert re.match(
-        r"1/cond J is \S+, most by δ2; δ2 = 0 is \S+ mm of motion away", found.reason(10.0)
+        r"1/cond J is \S+, most by δ2; δ2 = 0 is \S+ mm of motion away",
+        found.reason(Unit("mm", 10.0)),
     )
-    assert found.brief(10.0).startswith("1/cond J ")
+    assert found.brief(Unit("mm", 10.0)).startswith("1/cond J ")
 
 
 def test_verdict_names_a_measure_that_is_below_its_warning_value() -> None:

@@ -40,7 +40,7 @@ from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import UNITS, format_number
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions
@@ -67,7 +67,7 @@ def with_workspace(state: State, **changes: Any) -> State:
 def test_volume_is_known_while_the_solid_is_not_shown() -> None:
     services, first = services_for(), open_state(OPTIMAL)
     feed = services.get(feeds.VOLUME_FEED)
-    assert volume_text(feed.drawing) == "–"
+    assert volume_text(feed.drawing, UNITS) == "–"
     assert "Computing" in volume_headline(Frame(first), feed)
     for state in (first, SetVariable("a3x", 17.0).apply(first)):
         feed.follow(Frame(state))
@@ -76,9 +76,9 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
         expected = workspace_volume(state.design, state.pose.rotation)
         assert services.get(feeds.WORKSPACE_FEED).drawing is None
         assert feed.is_current
-        assert volume_text(feed.drawing) == f"{format_number(expected.volume, 6)} units³"
+        assert volume_text(feed.drawing, UNITS) == f"{format_number(expected.volume)} units³"
         words = volume_headline(Frame(state), feed)
-        assert volume_text(feed.drawing) in words
+        assert volume_text(feed.drawing, UNITS) in words
         # One unit of the design is a centimetre.
         litres = format_number(expected.volume, 4), format_number(0.001 * expected.volume, 4)
         assert f"{litres[0]} cm³ ({litres[1]} l)" in words
@@ -92,7 +92,7 @@ def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
         follow(services, chosen)
         feed = services.get(feeds.VOLUME_FEED)
         expected = workspace_volume(OPTIMAL, feeds.workspace_pose(Frame(chosen)).rotation).volume
-        assert volume_text(feed.drawing) == f"{format_number(expected, 6)} units³"
+        assert volume_text(feed.drawing, UNITS) == f"{format_number(expected)} units³"
         assert f"in the {words} orientation" in volume_headline(Frame(chosen), feed)
 
 
@@ -220,7 +220,7 @@ def test_map_has_its_place_for_the_page(axis: Axis, angles: tuple[float, float, 
     state = with_workspace(open_state(OPTIMAL, pose), solid=True, cut=axis)
     drawing = drawing_of(state)
     assert drawing.slice_map is not None
-    picture = map_picture(drawing.slice_map, pose.position, OPTIMAL.reach)
+    picture = map_picture(drawing.slice_map, pose.position, OPTIMAL.reach, UNITS)
     facts = facts_of(picture)
     assert facts["axis"] == "xyz".index(axis)
     assert facts["level"] == drawing.slice_map.level
@@ -262,14 +262,14 @@ def test_b4_is_a_cross_where_it_is_and_faint_beside_the_slice() -> None:
     assert drawn is not None
     for y, look in ((drawn.level, "ex-here"), (drawn.level + 1.0, "ex-here is-off")):
         pose = Pose((7.0, y, 6.0), state.pose.quaternion)
-        picture = map_picture(drawn, pose.position, OPTIMAL.reach)
+        picture = map_picture(drawn, pose.position, OPTIMAL.reach, UNITS)
         assert f'class="{look}"' in picture
         left, bottom, scale = facts_of(picture)["place"]
         (x, across) = re.findall(r'd="M([\d.]+),([\d.]+)h10m-5,-5v10"', picture)[0]
         assert float(x) + 5.0 == pytest.approx(left + scale * (7.0 - drawn.lows[0]), abs=0.01)
         assert float(across) == pytest.approx(bottom - scale * (6.0 - drawn.lows[1]), abs=0.01)
     away = Pose((70.0, drawn.level, 6.0), state.pose.quaternion)
-    assert "ex-here" not in map_picture(drawn, away.position, OPTIMAL.reach)
+    assert "ex-here" not in map_picture(drawn, away.position, OPTIMAL.reach, UNITS)
 
 
 # Files
@@ -433,14 +433,14 @@ def test_map_words_tell_the_measure_at_a_position(colour: str, reading: str) -> 
     assert mapped is not None
     rotation, digit = mapped.colouring.rotation, 0.005
     for x, z in ((12.5, 7.25), (3.0, 12.125), (9.0, 1.0)):
-        words = mapped.words_at((x, mapped.level, z))
+        words = mapped.words_at((x, mapped.level, z), UNITS)
         found = re.fullmatch(rf"x {x:.2f}, z {z:.2f} units: {reading}", words)
         assert found is not None, words
         at = np.array([[x, mapped.level, z]])
         (expected,) = measured(design, colour, at, rotation).tolist()
         factor = 100.0 if colour == "share" else 1.0
         assert float(found[1]) == pytest.approx(factor * expected, rel=digit, abs=digit)
-    singular = mapped.words_at((9.0, mapped.level, 0.0))
+    singular = mapped.words_at((9.0, mapped.level, 0.0), UNITS)
     if colour not in ("plain", "condition"):
         # No part has what is infinite in all.
         assert " ∞ " in singular
@@ -463,7 +463,7 @@ def test_map_is_read_to_the_browser_that_asks(services: Services) -> None:
     drawing = services.get(feeds.WORKSPACE_FEED).drawing
     assert drawing is not None
     assert drawing.slice_map is not None
-    words = drawing.slice_map.words_at((12.5, 5.0, 7.25))
+    words = drawing.slice_map.words_at((12.5, 5.0, 7.25), UNITS)
     assert f'window.explorer.map("{place}", "{words}");' in script
 
 

@@ -287,6 +287,6 @@ def test_drawing_shows_its_stage_and_is_cancelled_and_requested_again(
         feed.follow(frame)
         wait_for(lambda: feed.is_current)
         assert not feed.is_cancelled
-        assert "units³" in drawing_words(frame, feed)
+        assert "cm³" in drawing_words(frame, feed)
     finally:
         worker.stop()

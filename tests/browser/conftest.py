@@ -12,7 +12,7 @@ import pytest
 from graphics import quick_browser
 from kept_tab import KeptTab, OpenTab
 from playwright.sync_api import Browser, expect
-from tab import Tab
+from tab import IN_UNITS, Tab
 
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.studies.feature import StudiesPanel
@@ -51,7 +51,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="session")
 def kept_tab(browser: Browser) -> Iterator[KeptTab]:
     """The tab that tests hand on."""
-    kept = KeptTab(lambda: Tab(browser, start(OPTIMAL, port=0), draws=True))
+    kept = KeptTab(lambda: Tab(browser, start(OPTIMAL, port=0, view=IN_UNITS), draws=True))
     yield kept
     kept.close()
 
@@ -59,7 +59,7 @@ def kept_tab(browser: Browser) -> Iterator[KeptTab]:
 @pytest.fixture
 def running(capfd: pytest.CaptureFixture[str]) -> Iterator[Running]:
     """An explorer with the paper's optimum; none of its threads may have failed in the end."""
-    running = start(OPTIMAL, port=0)
+    running = start(OPTIMAL, port=0, view=IN_UNITS)
     yield running
     running.stop()
     assert capfd.readouterr().err == ""
@@ -74,7 +74,8 @@ def kept_data_tab(browser: Browser, tmp_path_factory: pytest.TempPathFactory) ->
     def open_tab() -> Tab:
         data = UserData(Library(designs), SessionFile(home / "sessions"))
         folders = StudyFolders(studies)
-        return Tab(browser, start(OPTIMAL, port=0, user_data=data, studies=folders))
+        running = start(OPTIMAL, port=0, view=IN_UNITS, user_data=data, studies=folders)
+        return Tab(browser, running)
 
     def tidy(tab: Tab) -> None:
         for folder in (designs, studies):

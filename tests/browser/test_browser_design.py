@@ -81,7 +81,7 @@ def limits(tab: Tab) -> Tab:
     # The test before may have left them open.
     tab.settle()
     if not tab.label("l1").is_visible():
-        tab.page.get_by_text("Limits (design units)", exact=True).click()
+        tab.page.get_by_text("Limits (units)", exact=True).click()
     tab.label("l1").wait_for()
     return tab
 

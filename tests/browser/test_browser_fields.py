@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.state.actions import SetPosition
+from explorer.app.state.actions import Set, SetPosition
 
 
 def words_of_steps(tab: Tab) -> list[str]:
@@ -64,7 +64,7 @@ def test_number_is_entered_whole_however_it_is_written_typed_or_pasted(tab: Tab)
         # Within a moment of each other, numbers of one field are one step.
         assert len(words_of_steps(tab)) in (before, before + 1)
     tab.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    for text, value in (("3,25", 3.25), ("1,234.5", 3.25), ("3,25 mm", 3.25), ("−2", -2.0)):
+    for text, value in (("3,25", 3.25), ("1,234.5", 3.25), ("32,5 mm", 3.25), ("−2", -2.0)):
         tab.page.evaluate("text => navigator.clipboard.writeText(text)", text)
         for empties in (True, False):
             replace_all(tab, "x")
@@ -149,6 +149,20 @@ def test_number_that_arrives_leaves_a_field_selected_so_that_typing_replaces_it(
     tab.page.keyboard.press("Backspace")
     tab.page.keyboard.press("Enter")
     wait_for_x(tab, 3.2)
+
+
+def test_length_may_be_typed_in_another_unit_and_what_is_none_is_explained(tab: Tab) -> None:
+    for lengths in ("mm", "design units"):
+        tab.running.page.session.do(Set("view.lengths", lengths))
+        for text, value in (("120 mm", 12.0), ("12,5 cm", 12.5), ("1 in", 2.54), ("4 units", 4.0)):
+            tab.type("x", f"{text}\n")
+            tab.wait_for(lambda value=value: tab.state.pose.position[0] == value, f"x = {text}")
+    tab.type("yaw (°)", "30°\n")
+    tab.wait_for(lambda: tab.state.yaw_pitch_roll[0] == 30.0, "yaw = 30°")
+    tab.type("x", "abc\n")
+    expect(tab.page.get_by_role("alert").filter(has_text="abc")).to_contain_text("type a number in")
+    tab.field("y").focus()
+    expect(tab.page.locator(".ex-refusal")).to_have_count(0)
 
 
 def test_field_with_no_number_or_a_refused_one_gets_back_what_was_there(
@@ -284,7 +298,7 @@ def test_undo_in_a_field_is_that_of_the_explorer(tab: Tab) -> None:
         tab.page.keyboard.press(undo)
     tab.page.keyboard.press("ControlOrMeta+y")
     tab.wait_for(lambda: tab.state.pose.position[1] == 6.5, "redone")
-    assert words_of_steps(tab)[1:] == ["y = 6.5"]
+    assert words_of_steps(tab)[1:] == ["y = 6.5 units"]
 
 
 def test_name_may_hold_blanks_be_emptied_and_be_saved_right_after_typing(data_tab: Tab) -> None:

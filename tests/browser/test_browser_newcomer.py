@@ -27,7 +27,7 @@ SIZE, LARGER = (1280, 720), (1440, 900)
 # A value of a3x other than that of the paper's optimum, and the design with it.
 A3X = 18.0
 CHANGED = OPTIMAL.with_variables((A3X, *OPTIMAL.variables[1:]))
-READING = re.compile(r"y ([−\d.]+), z ([−\d.]+) units: min \|δ\| ([\d.]+) \(δ(\d)\)")
+READING = re.compile(r"y ([−\d.]+), z ([−\d.]+) mm: min \|δ\| ([\d.]+) \(δ(\d)\)")
 # Texts at the axes of each chart; null for an axis that is not drawn.
 AXIS_TEXTS = """() => {
   const plots = Object.values(window.__viserTestpoints.uplots);
@@ -46,7 +46,7 @@ def newcomer(data_tab: Tab) -> Newcomer:
 
 def volume_of(design: Design) -> str:
     """Return the volume of a design as the page writes it."""
-    return format_number(workspace_volume(design).volume, 6)
+    return format_number(workspace_volume(design).volume)
 
 
 def model_in(data: bytes) -> str:
@@ -57,23 +57,23 @@ def model_in(data: bytes) -> str:
 
 def test_platform_is_moved_by_a_slider_and_by_a_field(newcomer: Newcomer) -> None:
     x, distance = newcomer.field("x"), newcomer.figure("Nearest singular pose")
-    expect(x).to_have_value("10")
+    expect(x).to_have_value("100")
     before = distance.inner_text()
     newcomer.drag_slider("x", 12.0)
-    expect(x).not_to_have_value("10")
+    expect(x).not_to_have_value("100")
     expect(distance).not_to_have_text(before)
     assert newcomer.presses_for() == 1
-    newcomer.type("z", "7.5")
-    expect(newcomer.field("z")).to_have_value("7.5")
+    newcomer.type("z", "75")
+    expect(newcomer.field("z")).to_have_value("75")
     assert newcomer.presses_for() == 2
     newcomer.press("Leg lengths")
-    expect(newcomer.field("l1 leg 1")).not_to_have_value("11.74")
+    expect(newcomer.field("l1 leg 1")).not_to_have_value("117.4")
     assert newcomer.presses_for() == 1
 
 
 def test_pose_near_a_singularity_is_named_in_amber_with_its_distance(newcomer: Newcomer) -> None:
     assert 90.0 < hue(newcomer.sees("Clear of singularities")) < 150.0
-    newcomer.type("z", "0.5")
+    newcomer.type("z", "5")
     assert 25.0 < hue(newcomer.sees("Near a singularity")) < 50.0
     newcomer.wait()
     words = newcomer.sees(
@@ -106,7 +106,7 @@ def test_volume_after_a_change_of_the_design_is_in_sight(newcomer: Newcomer) -> 
     volume = newcomer.figure("Volume")
     expect(volume).to_contain_text(volume_of(OPTIMAL))
     newcomer.open("Design")
-    newcomer.type("a3x", f"{A3X:g}")
+    newcomer.type("a3x", f"{10.0 * A3X:g}")
     assert newcomer.presses_for() == 3
     expect(volume).to_contain_text(volume_of(CHANGED))
     expect(volume).to_be_in_viewport(ratio=1.0)
@@ -117,7 +117,7 @@ def test_workspace_is_cut_in_its_middle_and_a_value_is_read(newcomer: Newcomer) 
     newcomer.open("Workspace")
     newcomer.press("x")
     expect(newcomer.field("Cut at")).to_have_value(re.compile(r"^10(\.0+)?$"))
-    chart = newcomer.page.get_by_role("img", name="Map of the slice at x = 10")
+    chart = newcomer.page.get_by_role("img", name="Map of the slice at x = 100 mm")
     newcomer.wait()
     chart.scroll_into_view_if_needed()
     newcomer.page.mouse.move(*middle(chart))
@@ -164,7 +164,7 @@ def test_problem_of_the_paper_is_solved_in_two_presses(newcomer: Newcomer) -> No
     clearance = rows.filter(has_text=re.compile("^clearance")).inner_text()
     assert numbers(volume)[1] >= 8000.0
     assert numbers(clearance)[1] >= 0.2
-    expect(newcomer.figure("Volume")).to_contain_text("8,000 units³")
+    expect(newcomer.figure("Volume")).to_contain_text("8,000 cm³")
     with newcomer.page.expect_download() as hull:
         newcomer.press("Hull")
     assert hull.value.suggested_filename == "paper-initial-optimised-hull.3mf"
@@ -188,9 +188,9 @@ def test_three_designs_are_compared_by_volume_and_overlay(newcomer: Newcomer) ->
     newcomer.press("Pin paper-initial")
     newcomer.press("Pin this design")
     newcomer.open("Design")
-    newcomer.type("a3x", f"{A3X:g}")
+    newcomer.type("a3x", f"{10.0 * A3X:g}")
     volumes = [workspace_volume(each).volume for each in (CHANGED, INITIAL, OPTIMAL)]
-    row = newcomer.page.get_by_role("row").filter(has_text=re.compile("^volume units"))
+    row = newcomer.page.get_by_role("row").filter(has_text=re.compile("^volume cm³"))
     newcomer.wait_for_numbers(row, volumes)
     newcomer.press("Overlay workspaces")
     overlay = newcomer.button("Overlay workspaces")
@@ -220,12 +220,12 @@ def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.Monk
     newcomer.press("Home pose")
     expect(newcomer.field("roll (°)")).to_have_value("0")
     newcomer.choose("Goal", "Present pose")
-    newcomer.type("Goal x, y, z z", "8")
+    newcomer.type("Goal x, y, z (mm) z", "80")
     newcomer.press("Without singularity")
     newcomer.press("Go")
     newcomer.sees(re.compile("^Planned path of"))
     newcomer.sees(re.compile("^No singular pose;"))
-    expect(newcomer.field("z")).to_have_value(re.compile(r"^8(\.0+)?$"))
+    expect(newcomer.field("z")).to_have_value(re.compile(r"^80(\.0+)?$"))
     assert newcomer.presses_for() == 7
 
 
@@ -267,7 +267,7 @@ def test_study_is_started_brushed_and_a_design_of_it_picked(newcomer: Newcomer) 
 
 
 def test_design_is_saved_renamed_reloaded_and_undone(newcomer: Newcomer) -> None:
-    newcomer.type("x", "12")
+    newcomer.type("x", "120")
     newcomer.press("paper-optimal preset")
     newcomer.type("Name", "first try")
     newcomer.press("Save")
@@ -279,10 +279,10 @@ def test_design_is_saved_renamed_reloaded_and_undone(newcomer: Newcomer) -> None
     newcomer.key("Escape")
     newcomer.reload()
     newcomer.button("second try saved").wait_for()
-    expect(newcomer.field("x")).to_have_value("12")
-    newcomer.type("x", "13")
-    newcomer.press(re.compile("^Undo x = 13"))
-    expect(newcomer.field("x")).to_have_value("12")
+    expect(newcomer.field("x")).to_have_value("120")
+    newcomer.type("x", "130")
+    newcomer.press(re.compile("^Undo x = 130 mm"))
+    expect(newcomer.field("x")).to_have_value("120")
     newcomer.button("second try saved").wait_for()
 
 
@@ -312,7 +312,7 @@ def test_mechanism_ten_thousand_times_larger_is_in_sight_and_again_after_undo(
 
 def test_design_scene_and_report_are_shared(newcomer: Newcomer, tmp_path: Path) -> None:
     newcomer.open("Design")
-    newcomer.type("a3x", f"{A3X:g}")
+    newcomer.type("a3x", f"{10.0 * A3X:g}")
     newcomer.presses_for()
     scene = newcomer.export("Scene", "HTML")
     assert newcomer.presses_for() <= 3
@@ -321,7 +321,7 @@ def test_design_scene_and_report_are_shared(newcomer: Newcomer, tmp_path: Path) 
     for page in (scene, report):
         assert page.lstrip().lower().startswith(b"<!doctype html>")
         assert b"paper-optimal" in page
-    assert volume_of(CHANGED).encode() in report
+    assert format_number(workspace_volume(CHANGED).volume, 6).encode() in report
     data = newcomer.export("Design", "JSON")
     assert newcomer.presses_for() <= 3
     assert decode_design(data, "shared").variables == CHANGED.variables
@@ -343,7 +343,7 @@ def test_theme_palette_and_keys_are_found_in_the_bar(newcomer: Newcomer) -> None
     newcomer.press("Theme")
     newcomer.wait_for_lightness(lambda now: now > 0.9 * light)
     assert newcomer.presses_for() == 2
-    newcomer.type("x", "12")
+    newcomer.type("x", "120")
     newcomer.press(re.compile("^Search"))
     expect(newcomer.page.get_by_placeholder("Search commands")).to_be_focused()
     newcomer.page.keyboard.type("home pose")
@@ -396,22 +396,23 @@ def test_mistakes_are_refused_with_a_reason_and_lose_nothing(
     x, volume = newcomer.field("x"), newcomer.figure("Volume")
     newcomer.type("x", "1e9")
     newcomer.sees(re.compile("too far to be drawn"))
-    expect(x).to_have_value("10")
+    expect(x).to_have_value("100")
     newcomer.type("x", "ten")
-    expect(x).to_have_value("10")
+    newcomer.sees(re.compile("“ten” is no length"))
+    expect(x).to_have_value("100")
     expect(newcomer.button("Undo")).to_be_disabled()
     # A length that closes nothing stays to be seen, with the reason, until it is undone.
     newcomer.press("Leg lengths")
-    newcomer.type("l1 leg 1", "300")
-    newcomer.sees("l1 = 300 cannot close the tetrahedron b1 b2 b3 a1")
+    newcomer.type("l1 leg 1", "3000")
+    newcomer.sees("l1 = 3,000 mm cannot close the tetrahedron b1 b2 b3 a1")
     newcomer.press(re.compile("^Undo"))
-    expect(newcomer.field("l1 leg 1")).to_have_value("11.74")
+    expect(newcomer.field("l1 leg 1")).to_have_value("117.4")
     newcomer.open("Design")
     newcomer.type("1 unit (mm)", "0")
     newcomer.sees("The unit must be positive; got 0")
     expect(newcomer.field("1 unit (mm)")).to_have_value("10")
     newcomer.open("Optimise")
-    newcomer.type("Volume", "99999")
+    newcomer.type("Volume (cm³)", "99999")
     newcomer.sees("The box holds at most 12,240 of the 99,999 units³ asked for.")
     expect(newcomer.button("Lift the box")).to_be_visible()
     expect(newcomer.button("Optimise")).to_be_disabled()

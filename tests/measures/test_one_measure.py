@@ -22,6 +22,7 @@ from explorer.measures.catalogue import CATALOGUE, Measure, measure_design, meas
 from explorer.measures.measure import Case
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
+from explorer.numerics.number_text import UNITS
 from explorer.optimise.defaults import make_problem, paper_start
 from explorer.optimise.outcome import compare_designs
 from explorer.optimise.problem import Problem
@@ -127,7 +128,7 @@ def study() -> Study:
 
 def test_compare_lists_a_new_measure() -> None:
     measured = measure_design(Case(DESIGN), measures_in("compare"))
-    html = table([Column(0, DESIGN, measured, 1.0)], millimetres=False)
+    html = table([Column(0, DESIGN, measured, UNITS)])
     assert f"{NEW.label} " in html
     assert "units²" in html
     assert f"{AREA:.4f}" in html

@@ -15,6 +15,7 @@ from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in, 
 from explorer.measures.measure import Case
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
+from explorer.numerics.number_text import Unit
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, stiffness_of
 from explorer.statics.reactions import limit_shares
@@ -39,7 +40,7 @@ def values(
 def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
     found = {name: value or math.nan for name, value in values(PRECISE).items()}
     assert tuple(found) == NAMES
-    units = [CATALOGUE[name].unit_in("mm") for name in NAMES]
+    units = [CATALOGUE[name].unit_in(Unit("mm", 1.0)).name for name in NAMES]
     assert units == ["", "", "kg", "N m", "mm", "°", "mm/N", "mm"]
     rotation = PRECISE.home_pose.rotation
     positions = np.random.default_rng(1).uniform(*BOX, (1000, 3))

@@ -89,6 +89,10 @@ OWN_MESSAGES = 3
 _numbers = itertools.count(1)
 
 
+# Fields then show what the state has.
+IN_UNITS = View(lengths="design units")
+
+
 class Tab:
     """One page of an explorer, which draws its scene only while it is told to.
 
@@ -155,7 +159,7 @@ class Tab:
         # A field enters what was typed as it loses the focus.
         self._hear()
         # A move through the history leaves what is shown as it is.
-        session.do(Set("view", View()))
+        session.do(Set("view", IN_UNITS))
         session.do(HistoryMove(lambda _: start_history(open_state(PRESETS["paper-optimal"]))))
         page.panels.work.minimize()
         # Cameras follow what has changed, and the scene has its size, before this one is put.

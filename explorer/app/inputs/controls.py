@@ -9,15 +9,23 @@ pointer.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Generic, Literal, TypeAlias, TypedDict, TypeVar, Unpack
+from dataclasses import dataclass, field, replace
+from typing import Any, Generic, Literal, TypeAlias, TypedDict, TypeVar, Unpack, cast
 
 import viser
 
 from explorer.app.browser.viser_gaps import MARKS, slider_marks
-from explorer.app.inputs.ranges import Intervals, Span, Track, decimals, tint_marks
+from explorer.app.inputs.ranges import (
+    Intervals,
+    Span,
+    Track,
+    decimals,
+    in_whole_steps,
+    tint_marks,
+    unit_step,
+)
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action, Set
+from explorer.app.state.actions import Action, Set, value_text
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
@@ -97,6 +105,45 @@ def bound_to(
     if isinstance(at, Bound):
         return at
     return (At(at) if isinstance(at, str) else at).bound(name, options)
+
+
+def in_unit(bound: Bound[Any], power: int) -> Bound[Any]:
+    """Return the binding of a control that shows lengths, or a power of them, in the view's unit.
+
+    Of several values those that stay as they were shown keep their last bit.
+    """
+
+    def read(frame: Frame) -> Any:
+        unit, value = frame.state.unit_of(power), bound.read(frame)
+        values = tuple(map(unit.convert, _parts(value)))
+        return values if isinstance(value, tuple) else values[0]
+
+    def write(state: State, new: Any) -> Action:
+        frame, unit = Frame(state), state.unit_of(power)
+        pairs = zip(_parts(new), _parts(bound.read(frame)), _parts(read(frame)), strict=True)
+        values = [old if part == shown else unit.read(part) for part, old, shown in pairs]
+        action = bound.write(state, tuple(values) if isinstance(new, tuple) else values[0])
+        if isinstance(action, Set) and not action.text:
+            text = " to ".join(map(value_text, _parts(new)))
+            return replace(action, text=f"{text} {unit.name}")
+        return action
+
+    return Bound(read, write)
+
+
+def _parts(value: Any) -> tuple[float, ...]:
+    return cast("tuple[float, ...]", value) if isinstance(value, tuple) else (value,)
+
+
+def _span_in_unit(span: Span | Callable[[State], Span], power: int) -> Callable[[State], Span]:
+    def span_of(state: State) -> Span:
+        return in_whole_steps(span if isinstance(span, Span) else span(state), state.unit_of(power))
+
+    return span_of
+
+
+def _step_in_unit(step: float | Callable[[State], float], power: int) -> Callable[[State], float]:
+    return lambda state: unit_step(step(state) if callable(step) else step, state.unit_of(power))
 
 
 Condition = Callable[[State], bool]
@@ -229,6 +276,14 @@ class Controls:
         self._gui = gui
         self._session = session
         self._controls: list[Control[Any]] = []
+        # Folders and controls with the words that name them, and the power of length of their unit.
+        self._labels: list[tuple[Any, str, int]] = []
+
+    def folder(self, title: str, *, is_open: bool = True) -> viser.GuiFolderHandle:
+        """Add a folder, in whose title "{unit}" stands for the unit of lengths."""
+        handle = self._gui.add_folder(title, expand_by_default=is_open)
+        self._labels.append((handle, title, 1))
+        return handle
 
     def slider(
         self,
@@ -240,12 +295,13 @@ class Controls:
         tinted: Callable[[Frame], Intervals] | None = None,
         coloured: Callable[[Frame, Span], str] | None = None,
         closes_up: bool = False,
+        power: int = 0,
         **conditions: Unpack[Conditions],
     ) -> Slider:
         """Add a slider with a number field.
 
         Args:
-            label: Words beside it.
+            label: Words beside it, in which "{unit}" stands for the unit of lengths.
             hint: Sentence on what it sets.
             at: Source of its value.
             span: Range of its track, which may follow the state; values beyond can be typed.
@@ -253,15 +309,19 @@ class Controls:
             coloured: Function that returns the colours of the track for its range, as stops of a
                 CSS gradient; None for grey.
             closes_up: Whether the track shows only the surroundings of its tinted parts.
+            power: Exponent of length in the unit of the value, 0 if it is plain: a length or a
+                volume is shown in the unit of the view; the range is in design units.
             conditions: In which states it is disabled and visible.
         """
         # The stylesheet puts the colours on the track.
         colours = None if coloured is None else (self._gui.add_html(""), coloured)
+        if power:
+            span = _span_in_unit(span, power)
         handle = self._gui.add_slider(label, 0.0, 1.0, 0.01, 0.0, hint=hint, marks=())
         slider = Slider(
             self._session,
             handle,
-            bound_to(at, label),
+            self._bound(handle, at, label, power=power),
             track=Track(handle, span, closes_up=closes_up),
             tinted=tinted,
             colours=colours,
@@ -276,6 +336,8 @@ class Controls:
         hint: str,
         at: Bound[Pair],
         span: Callable[[State], Span],
+        *,
+        power: int = 0,
         **conditions: Unpack[Conditions],
     ) -> None:
         """Add a range in one row: a slider with two thumbs, and a number field for each end.
@@ -285,20 +347,18 @@ class Controls:
             hint: Sentence on what it sets.
             at: Binding of its ends, the lower one first; the fields may be given them in any order.
             span: Function that returns the range of its track; values beyond can be typed.
+            power: Exponent of length, as in `slider`.
             conditions: In which states it is disabled and visible.
         """
         thumbs = self._gui.add_multi_slider(label, 0.0, 1.0, 0.01, (0.0, 1.0), marks=(), hint=hint)
         # The stylesheet puts the fields into the row of the thumbs, and a script names them.
         fields = self._gui.add_vector2(f"{label} ends", (0.0, 1.0), step=0.01, hint=hint)
         untyped: Any = thumbs
+        shown, bound = (_span_in_unit(span, power), in_unit(at, power)) if power else (span, at)
         self._controls.append(
-            Slider(self._session, untyped, at, track=Track(thumbs, span), **conditions)
+            Slider(self._session, untyped, bound, track=Track(thumbs, shown), **conditions)
         )
-
-        def step(state: State) -> float:
-            return span(state).step
-
-        self._bind(fields, at, step, **conditions)
+        self._bind(fields, bound, lambda state: shown(state).step, **conditions)
 
     def number(
         self,
@@ -308,26 +368,26 @@ class Controls:
         *,
         least: float,
         step: float | Callable[[State], float],
-        small: bool = False,
+        power: int = 0,
         **conditions: Unpack[Conditions],
     ) -> None:
         """Add a number field; its step may follow the state.
 
         Args:
-            label: Words beside it.
+            label: Words beside it, in which "{unit}" stands for the unit of lengths.
             hint: Sentence on what it sets.
             at: Source of its value.
             least: Least value.
             step: Step of its buttons, whose decimals are shown.
-            small: Whether values far below a step that is given count, and have their decimals.
+            power: Exponent of length, as in `slider`; least value and step are in design units.
             conditions: In which states it is disabled and visible.
         """
-        follows = step if callable(step) else None
+        follows = _step_in_unit(step, power) if power else step if callable(step) else None
         fixed = None if callable(step) else step
         handle = self._gui.add_number(label, least, min=least, step=fixed, hint=hint)
-        if small:
-            handle.precision = MOST_DECIMALS
-        self._bind(handle, bound_to(at, label), follows, **conditions)
+        handle.precision = MOST_DECIMALS
+        bound = self._bound(handle, at, label, power=power)
+        self._bind(handle, bound, follows, **conditions)
 
     def triple(
         self,
@@ -336,14 +396,14 @@ class Controls:
         at: Source[Triple],
         *,
         step: float,
-        small: bool = False,
+        power: int = 0,
         **conditions: Unpack[Conditions],
     ) -> None:
-        """Add three number fields side by side; `small` as in `number`."""
+        """Add three number fields side by side; `power` as in `number`."""
         handle = self._gui.add_vector3(label, (0.0, 0.0, 0.0), step=step, hint=hint)
-        if small:
-            handle.precision = MOST_DECIMALS
-        self._bind(handle, bound_to(at, label), **conditions)
+        handle.precision = MOST_DECIMALS
+        bound = self._bound(handle, at, label, power=power)
+        self._bind(handle, bound, _step_in_unit(step, power) if power else None, **conditions)
 
     def checkbox(
         self, label: str, hint: str, at: Source[bool], **conditions: Unpack[Conditions]
@@ -406,6 +466,16 @@ class Controls:
 
         return handle
 
+    def _bound(
+        self, handle: viser.GuiInputHandle[Any], at: Source[Any], label: str, *, power: int
+    ) -> Bound[Any]:
+        """Return the binding of a control whose label may have the unit of lengths."""
+        name, _, unit = label.partition(" ({unit")
+        if unit:
+            self._labels.append((handle, label, power))
+        bound = bound_to(at, name)
+        return in_unit(bound, power) if power else bound
+
     def _bind(
         self,
         handle: viser.GuiInputHandle[Value],
@@ -418,5 +488,7 @@ class Controls:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make every control show the frame."""
+        for handle, words, power in self._labels:
+            yield handle, "label", words.format(unit=frame.state.unit_of(power).name)
         for control in self._controls:
             yield from control.updates(frame)

@@ -19,6 +19,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.mechanism.configuration import Point, point_of
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
 from explorer.mechanism.feasible_intervals import Interval, possible_ranges
+from explorer.numerics.number_text import Unit
 
 # Least width of a close-up over the whole range, and least part of the track that is tinted before
 # the close-up is made anew.
@@ -32,6 +33,22 @@ class Span:
     low: float
     high: float
     step: float
+
+
+@functools.lru_cache(256)
+def in_whole_steps(span: Span, unit: Unit) -> Span:
+    """Return a range in a unit, with round ends and a round step."""
+    if unit.factor == 1.0:
+        return span
+    step = unit_step(span.step, unit)
+    # Rounding must not put a round end a step farther.
+    room = 0.1 * step
+    return round_span(span.low * unit.factor + room, span.high * unit.factor - room, step)
+
+
+def unit_step(step: float, unit: Unit) -> float:
+    """Return a step in a unit, a power of ten."""
+    return step if unit.factor == 1.0 else fine_step(step * unit.factor * (1.0 + 1e-9), 1.0)
 
 
 Intervals: TypeAlias = tuple[Interval, ...]

@@ -9,15 +9,52 @@ window.explorer.fields ??= (() => {
   // The field with the focus, its number at first, the number that the page last knew of, the text
   // that stands in it, and the ends of the selection.
   let typing = null;
-  const numberIn = (text) => {
+  // Units of length that may be typed, in millimetres; a design unit is that of the design.
+  const LENGTHS = { mm: 1, cm: 10, m: 1000, in: 25.4, '"': 25.4 };
+  const ofUnits = (unit) =>
+    /^(design )?units?$/.test(unit)
+      ? Number(document.querySelector("[data-unit-mm]")?.dataset.unitMm)
+      : LENGTHS[unit];
+  // The unit of a field: that in brackets beside it, or else the first one in the title of its
+  // folder; "" for a plain number.
+  const unitOf = (field) => {
+    const words = [window.explorer.names.labelOf(field)];
+    const folder = field.closest(".mantine-Paper-root:has(> .mantine-Paper-root:first-child)");
+    words.push(folder?.firstElementChild.textContent ?? "");
+    const units = words.map((each) => /\((?:± )?([^(),]+)[^()]*\)$/.exec(each.trim())?.[1] ?? "");
+    return (units[0] || units[1]).normalize("NFKC");
+  };
+  const numberIn = (text, unit) => {
     // Full-width characters, as from an input method of East Asia, count too.
     const plain = text
       .normalize("NFKC")
       .trim()
       .replace(/^\u2212/, "-")
       .replace(/^([^.,]*),([^.,]*)$/, "$1.$2");
-    const value = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
+    const parts = /^([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*)$/i.exec(plain);
+    if (!parts) return null;
+    const [, number, typed] = parts,
+      factor = !typed || typed === unit ? 1 : ofUnits(typed) / ofUnits(unit);
+    // Of fifteen digits, so that 0.3 cm are 3 mm.
+    const value = factor === 1 ? Number(number) : Number((number * factor).toPrecision(15));
     return Math.abs(value) <= Number.MAX_SAFE_INTEGER ? value : null;
+  };
+  const LIFE = 6000;
+  // A sentence below a field on what it takes, until another field has the focus or time is over.
+  const explain = (field, unit) => {
+    document.querySelector(".ex-refusal")?.remove();
+    const allowed = Number.isFinite(ofUnits(unit))
+      ? `length: type a number in ${unit}, such as 0.3, or one with its unit: 3 mm, 2 cm, 1 in, 4 units`
+      : "number: type one such as 0.3 or 0,3";
+    const note = document.createElement("div"),
+      { left, bottom } = field.getBoundingClientRect();
+    note.className = "ex-refusal";
+    note.setAttribute("role", "alert");
+    note.textContent = `“${field.value.slice(0, 20)}” is no ${allowed}.`;
+    note.style.setProperty("--left", `${Math.min(left, innerWidth - 270)}px`);
+    note.style.setProperty("--top", `${bottom + 4}px`);
+    document.body.append(note);
+    clock.after(LIFE, () => note.remove());
   };
   // The page's number fields take no exponents.
   const plainText = (value) =>
@@ -37,8 +74,10 @@ window.explorer.fields ??= (() => {
   };
   const enter = () => {
     const { field, before } = typing,
-      value = numberIn(field.value);
+      unit = unitOf(field),
+      value = numberIn(field.value, unit);
     if (value === null) {
+      if (field.value.trim()) explain(field, unit);
       giveUp();
       return;
     }
@@ -81,7 +120,7 @@ window.explorer.fields ??= (() => {
   const rest = () => {
     hold();
     // A number that may be unfinished, such as 0.0 on the way to 0.05, is not entered.
-    const value = numberIn(typing.field.value);
+    const value = numberIn(typing.field.value, "");
     if (value !== null && plainText(value) === typing.field.value) enter();
   };
   const wait = () => {
@@ -108,6 +147,7 @@ window.explorer.fields ??= (() => {
     delete field.focus;
   };
   const startTyping = (field) => {
+    document.querySelector(".ex-refusal")?.remove();
     // The page would set the caret with each number.
     field.setSelectionRange = () => {};
     const { value } = field;

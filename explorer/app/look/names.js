@@ -91,5 +91,5 @@ window.explorer.names ??= (() => {
     document.documentElement.dataset.at = words.find((each) => each) ?? "";
   };
   for (const event of ["pointerover", "focusin", "focusout"]) addEventListener(event, mark, true);
-  return true;
+  return { labelOf };
 })();

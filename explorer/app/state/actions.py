@@ -140,7 +140,7 @@ class SetJoint(Action):
 
     def describe(self, after: State) -> str:
         """Return which joint has which value."""
-        return f"{JOINTS[self.joint]} = {format_number(self.value, 6, size=after.design.reach)}"
+        return f"{JOINTS[self.joint]} = {after.unit.text(self.value, 6, size=after.design.reach)}"
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class SetPosition(Action):
         name = "xyz"[self.axis]
         if after.view.at != "b4":
             name += f" of {after.point}"
-        return f"{name} = {format_number(self.value, 6, size=after.design.reach)}"
+        return f"{name} = {after.unit.text(self.value, 6, size=after.design.reach)}"
 
 
 @dataclass(frozen=True)
@@ -215,8 +215,9 @@ class SetPose(Action):
 
     def describe(self, after: State) -> str:
         """Return where the platform is."""
-        p, size = after.position, after.design.reach
-        return f"Move {after.point} to {', '.join(format_number(x, 4, size=size) for x in p)}"
+        unit, size = after.unit, after.design.reach
+        place = (format_number(unit.factor * x, 4, size=unit.factor * size) for x in after.position)
+        return f"Move {after.point} to {', '.join(place)} {unit.name}"
 
 
 @dataclass(frozen=True)
@@ -273,14 +274,15 @@ class SetVariable(Action):
         if not solution.feasible:
             present = state.design.variables[VARIABLES.index(self.name)]
             raise InputError(
-                f"{self.name} = {format_number(self.value, 6)} cannot be assembled while the legs "
-                f"are held; it stays {format_number(present, 6)}. Hold the pose to go further."
+                f"{self.name} = {state.unit.text(self.value, 6)} cannot be assembled while the "
+                f"legs are held; it stays {state.unit.text(present, 6)}. Hold the pose to go "
+                "further."
             )
         return _assemble(replace(state, design=design), solution, state.mode)
 
-    def words(self) -> str:
-        """Return what the action does."""
-        return f"{self.name} = {format_number(self.value, 6)}"
+    def describe(self, after: State) -> str:
+        """Return which variable has which value."""
+        return f"{self.name} = {after.unit.text(self.value, 6)}"
 
 
 @dataclass(frozen=True)

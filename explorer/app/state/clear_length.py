@@ -19,7 +19,6 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.feasible_intervals import feasible_intervals
 from explorer.mechanism.kinematics import forward
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import format_number
 
 # Number of lengths tried within an interval, and of halvings that refine the first clear one.
 TRIALS, HALVINGS = 24, 14
@@ -33,7 +32,7 @@ def clear_length(state: State) -> tuple[float, str] | None:
     unclosed = state.unclosed
     if unclosed is None or unclosed.nearest is None:
         return None
-    joint, end, unit_mm = unclosed.joint, unclosed.nearest, state.design.unit_mm
+    joint, end, unit = unclosed.joint, unclosed.nearest, state.unit
     intervals = feasible_intervals(state.design, np.array(state.joints))[joint]
     low, high = min(intervals, key=lambda ends: min(abs(ends[0] - end), abs(ends[1] - end)))
     far = high if abs(end - low) < abs(high - end) else low
@@ -50,10 +49,10 @@ def clear_length(state: State) -> tuple[float, str] | None:
     there = _verdict(state, joint, value)
     if there is None or there.kind == "singular":
         return None
-    taken, singular = format_number(value), format_number(end)
-    instead = f"{JOINTS[joint]} = {taken} instead of {format_number(unclosed.asked, 6)}. "
+    taken, singular = unit.text(value), unit.text(end)
+    instead = f"{JOINTS[joint]} = {taken} instead of {unit.text(unclosed.asked, 6)}. "
     why = f"{instead}The nearest value that closes, {singular}, is singular; "
-    short = f"{format_number(abs(value - end), 3)} short of it: {there.reason(unit_mm)}."
+    short = f"{unit.text(abs(value - end), 3)} short of it: {there.reason(unit)}."
     if is_clear:
         return value, f"{why}this is the nearest that stays clear, {short}"
     return value, f"{why}none stays clear, and this is the farthest from singular, {short}"

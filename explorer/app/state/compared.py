@@ -21,7 +21,6 @@ class Look:
 
     Attributes:
         shows: Whether measures stand in a table or are drawn as bars.
-        millimetres: Whether lengths are in millimetres, rather than in units of the live design.
         overlay: Whether the workspaces are drawn over one another.
         at_pose: Whether the workspace of the live design is drawn at its present orientation,
             rather than at that of its home.
@@ -29,7 +28,6 @@ class Look:
     """
 
     shows: Literal["table", "bars"] = "table"
-    millimetres: bool = False
     overlay: bool = False
     at_pose: bool = False
     outlines: bool = False

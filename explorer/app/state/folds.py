@@ -57,7 +57,7 @@ class SetFold(Action):
         """Return which coordinate has which value."""
         if self.index > 0:
             return f"{FOLDS[self.index]} = {format_number(self.value, 6, size=FULL_TURN)}°"
-        return f"{FOLDS[0]} = {format_number(self.value, 6, size=after.design.reach)}"
+        return f"{FOLDS[0]} = {after.unit.text(self.value, 6, size=after.design.reach)}"
 
 
 def folds_of(state: State) -> Folds:

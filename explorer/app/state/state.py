@@ -28,7 +28,7 @@ from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import Unit
 from explorer.singularity.colours import WARN_SHARE
 
 Joints = tuple[float, float, float, float, float, float]
@@ -53,16 +53,17 @@ class Unclosed:
     nearest: float | None
     failing: tuple[int, ...]
 
-    def __str__(self) -> str:
+    def words(self, unit: Unit) -> str:
+        """Return why they do not close, and what would, with a unit of lengths."""
         tetrahedra = " and ".join(" ".join(TETRAHEDRA[i]) for i in self.failing)
         kind = "tetrahedron" if len(self.failing) == 1 else "tetrahedra"
         advice = (
-            f"the nearest value that closes is {format_number(self.nearest, 6)}, at a singular pose"
+            f"the nearest value that closes is {unit.text(self.nearest, 6)}, at a singular pose"
             if self.nearest is not None
             else "with the other legs as they are, no value works"
         )
         name = JOINTS[self.joint]
-        asked = format_number(self.asked, 6)
+        asked = unit.text(self.asked, 6)
         return f"{name} = {asked} cannot close the {kind} {tetrahedra}; {advice}."
 
 
@@ -201,6 +202,15 @@ class State:
         ):
             return given
         return angles_of(tool)
+
+    @property
+    def unit(self) -> Unit:
+        """The unit in which lengths are shown and typed."""
+        return self.view.unit_for(self.design)
+
+    def unit_of(self, power: int) -> Unit:
+        """Return the unit of quantities with a power of length, such as 3 for volumes."""
+        return self.unit.raised(power, self.design.reach**3)
 
     @property
     def point(self) -> str:

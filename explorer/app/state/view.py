@@ -8,9 +8,10 @@ from typing import Literal
 from explorer.errors import InputError
 from explorer.measures.box import PositionSet
 from explorer.mechanism.configuration import Point
+from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.checks import STIFFEST, numbers, positive
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import UNITS, Unit, format_number
 
 ALUMINIUM = 2700.0
 """Density of aluminium, in kg/m³."""
@@ -168,6 +169,7 @@ class PrecisionView:
                 positive(f"the {name}", value, STIFFEST)
 
 
+LengthName = Literal["mm", "design units"]
 Coordinates = Literal["position", "lengths", "folds"]
 DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
@@ -196,6 +198,7 @@ class View:
     """What is shown, and how.
 
     Attributes:
+        lengths: The unit in which lengths are shown and typed; the state has design units.
         at: The point whose position is shown and set, and about which the platform turns.
         coordinates: The coordinates by which the pose is shown and set: the position of that point
             with three angles, the six lengths, or the six folds.
@@ -223,6 +226,7 @@ class View:
         InputError: The warning length is not positive.
     """
 
+    lengths: LengthName = "mm"
     at: Point = "b4"
     coordinates: Coordinates = "position"
     drawn_as: DrawnAs = "schematic"
@@ -246,6 +250,10 @@ class View:
     singular: SingularView = field(default_factory=SingularView)
     forces: ForcesView = field(default_factory=ForcesView)
     precision: PrecisionView = field(default_factory=PrecisionView)
+
+    def unit_for(self, design: Design) -> Unit:
+        """Return the unit in which lengths of a design are shown."""
+        return design.millimetres if self.lengths == "mm" else UNITS
 
     @property
     def is_twin(self) -> bool:

@@ -237,7 +237,7 @@ def _singularity_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]
     yield from (output.heading(design), output.pose_table(design, snapshot.pose, tool))
     yield from output.block_lines(
         (
-            Statement(here.title, here.reason(design.unit_mm)),
+            Statement(here.title, here.reason(design.millimetres)),
             *blocks.freedoms(snapshot),
             blocks.margin_table(snapshot),
             blocks.tetrahedra(snapshot),

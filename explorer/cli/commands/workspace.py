@@ -16,6 +16,7 @@ from explorer.measures.measure import Case
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import UNITS
 from explorer.workspace.accessible import radii, workspace as accessible
 from explorer.workspace.orientations import share as shares, tilts
 from explorer.workspace.solids import solids
@@ -213,7 +214,7 @@ class _Answer:
                 self.volumes.append((measure.heading, value or 0.0, remark))
             elif name not in _IN_REMARK:
                 text = "none" if value is None else output.figure(value)
-                others.append((measure.heading, f"{text} {measure.unit_in('units')}".rstrip()))
+                others.append((measure.heading, f"{text} {measure.unit_in(UNITS).name}".rstrip()))
         if others:
             self.lines.append(output.table(others, "<<"))
         if extent is not None:

@@ -24,7 +24,7 @@ from explorer.measures.blocks import source as sources
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import encode_design
-from explorer.numerics.number_text import format_number, power_of_ten
+from explorer.numerics.number_text import UNITS, format_number, power_of_ten
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Record, curves_of
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
@@ -101,7 +101,7 @@ def _headline(data: ReportData) -> Iterator[tuple[Piece, ...]]:
             count = element("span", whole(data.node_count.count), " nodes")
             yield title, value, _unit("units³, "), count
         else:
-            yield title, value, _unit(measure.unit_in("units"))
+            yield title, value, _unit(measure.unit_in(UNITS).name)
     yield "Reach", markup.number(reach, 4), _unit("mm")
     yield "Smallest margin |δ| here", markup.number(snapshot.proximity * reach, 4), _unit("mm")
     yield (

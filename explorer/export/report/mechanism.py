@@ -128,7 +128,7 @@ def _limits(data: ReportData) -> Element:
 
 def singularity_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on singularities."""
-    snapshot, unit = data.snapshot, data.design.unit_mm
+    snapshot, unit = data.snapshot, data.design.millimetres
     here = verdict(snapshot)
     yield element("h2", "Singularities")
     yield markup.paragraph(f"All values are those in {data.pose_words}.")

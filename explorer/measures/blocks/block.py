@@ -16,6 +16,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from explorer.numerics.number_text import (
+    Unit,
     format_column,
     format_decimals,
     format_fitted,
@@ -76,6 +77,14 @@ class Vector(msgspec.Struct, frozen=True):
     def texts(self) -> list[str]:
         """The components for people, without their unit."""
         return Column("", self.values, digits=self.digits, span=self.span).texts
+
+
+def measured(
+    value: float, unit: Unit, digits: int = 4, *, size: float = 0.0, span: float = 0.0
+) -> Number:
+    """Return a number in a unit, given the value, the size and the span in design units."""
+    f = unit.factor
+    return Number(f * value, f" {unit.name}", digits, f * size, f * span)
 
 
 def direction(values: Sequence[float]) -> Vector:

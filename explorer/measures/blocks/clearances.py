@@ -13,6 +13,7 @@ from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import Unit
 
 if TYPE_CHECKING:
     from explorer.legs.moves import MoveClearance
@@ -29,7 +30,7 @@ def names_of(pairs: Iterable[bool]) -> str:
 
 
 def verdict(
-    clearance: FloatArray, bound: FloatArray, design: Design, where: str = ""
+    clearance: FloatArray, bound: FloatArray, design: Design, unit: Unit, where: str = ""
 ) -> block.Statement:
     """Return whether legs collide, touch or are clear, and the least clearance, in words.
 
@@ -42,14 +43,9 @@ def verdict(
     elif (bound <= 0.0).any():
         title, look = f"Legs {names_of(bound <= 0.0)} touch{where}", "close"
     pair = int(clearance.argmin())
-    least, unit = float(clearance[pair]), design.unit_mm
-    numbers = (
-        block.Number(least, " units", 3, design.reach),
-        ", ",
-        block.Number(unit * least, " mm", 3, unit * design.reach),
-    )
+    least = block.measured(float(clearance[pair]), unit, 3, size=design.reach)
     return block.Statement(
-        title, (f"Least clearance: legs {pair_name(PAIRS[pair])}, ", *numbers), look
+        title, (f"Least clearance: legs {pair_name(PAIRS[pair])}, ", least), look
     )
 
 
@@ -57,20 +53,20 @@ def _table(
     title: str,
     values: FloatArray,
     design: Design,
+    unit: Unit,
     before: Iterable[block.Names | block.Column] = (),
     after: Iterable[block.Names | block.Column] = (),
     hint: str = CLEARANCE,
-    *,
-    is_wide: bool = False,
 ) -> block.Table:
-    """Return a table of clearances in design units and in millimetres, these wide or not."""
-    reach, unit = design.reach, design.unit_mm
+    """Return a table of clearances; where there is room, in design units too."""
+    reach = design.reach
     columns = (
         block.Names("legs", [pair_name(pair) for pair in PAIRS]),
         *before,
-        block.Column("clearance", values.tolist(), " units", DIGITS, size=reach, infinite="joined"),
-        block.Column("clearance", (unit * values).tolist(), " mm", DIGITS, size=unit * reach,
-                     infinite="", wide=is_wide),
+        block.Column("clearance", values.tolist(), " units", DIGITS, size=reach, infinite="joined",
+                     wide=True),
+        block.Column("clearance", (unit.factor * values).tolist(), f" {unit.name}", DIGITS,
+                     size=unit.factor * reach, infinite="joined"),
         *after,
     )  # fmt: skip
     looks: list[block.Look | None] = [
@@ -84,21 +80,25 @@ def _points(head: str, points: FloatArray) -> block.Names:
     return block.Names(head, words, wide=True)
 
 
-def pose_clearances(snapshot: Snapshot) -> Iterator[block.Block]:
-    """Yield whether legs collide in a pose, and the clearance of each pair."""
+def pose_clearances(snapshot: Snapshot, unit: Unit | None = None) -> Iterator[block.Block]:
+    """Yield whether legs collide in a pose, and the clearance of each pair; in mm unless told."""
     legs, design = snapshot.clearances, snapshot.design
-    yield verdict(legs.clearance, legs.clearance, design)
+    unit = unit or design.millimetres
+    yield verdict(legs.clearance, legs.clearance, design, unit)
     apart = block.Column("axes apart", legs.distance.tolist(), " units", infinite="", wide=True)
     points = (
         _points("closest point of the first", legs.points[:, 0]),
         _points("of the second", legs.points[:, 1]),
     )
-    yield _table("Clearance here", legs.clearance, design, (apart,), points)
+    yield _table("Clearance here", legs.clearance, design, unit, (apart,), points)
 
 
-def move_clearances(move: MoveClearance, design: Design) -> Iterator[block.Block]:
+def move_clearances(
+    move: MoveClearance, design: Design, unit: Unit | None = None
+) -> Iterator[block.Block]:
     """Yield whether legs collide on a move, by the exact test and the paper's, and where."""
-    yield verdict(move.clearance, move.bound, design, " on the way")
+    unit = unit or design.millimetres
+    yield verdict(move.clearance, move.bound, design, unit, " on the way")
     steps = "one step" if move.steps == 1 else f"{move.steps} steps"
     overlap = "no overlap" if move.is_free else f"overlap of {names_of(move.overlaps)}"
     yield block.Statement("", f"The paper's test in {steps}, without radii: {overlap}.")
@@ -110,6 +110,7 @@ def move_clearances(move: MoveClearance, design: Design) -> Iterator[block.Block
         "Least clearance on the way, and where on the way",
         move.clearance,
         design,
+        unit,
         (block.Names("swept tetrahedra", swept.tolist()),),
         (
             block.Column("never below", move.bound.tolist(), " units", infinite="", wide=True),
@@ -119,29 +120,34 @@ def move_clearances(move: MoveClearance, design: Design) -> Iterator[block.Block
                 positions + tool_offset(rotations, move.tool),
             ),
         ),
-        is_wide=True,
     )
 
 
-def workspace_clearances(pairs: Sequence[PairCost], design: Design) -> Iterator[block.Block]:
+def workspace_clearances(
+    pairs: Sequence[PairCost], design: Design, unit: Unit | None = None
+) -> Iterator[block.Block]:
     """Yield whether legs collide in a workspace, and what each pair blocks; nothing if it is empty.
 
-    The pairs are in the order of `PAIRS`.
+    The pairs are in the order of `PAIRS`; lengths are in mm unless another unit is given.
     """
+    unit = unit or design.millimetres
     clearance = np.array([pair.clearance for pair in pairs])
     if not np.isfinite(clearance).any():
         return
-    yield verdict(clearance, clearance, design, " in the workspace")
+    yield verdict(clearance, clearance, design, unit, " in the workspace")
     if (least := float(clearance.min())) > 0.0:
-        radius = block.Number(0.5 * least, " units", 3)
+        radius = block.measured(0.5 * least, unit, 3)
         yield block.Statement("", ("No two legs collide if all radii grow by up to ", radius, "."))
     bounds, blocked = [pair.bound for pair in pairs], [pair.blocked_volume for pair in pairs]
-    column = block.Column("blocked alone", blocked, " units³")
+    cubic = unit.raised(3, design.reach**3)
+    values = [cubic.factor * volume for volume in blocked]
+    column = block.Column("blocked alone", values, f" {cubic.name}")
     certified = block.Column("certified", bounds, " units", DIGITS, infinite="", wide=True)
     yield _table(
         "Least clearance in the workspace",
         clearance,
         design,
+        unit,
         after=(certified, column) if any(blocked) else (certified,),
         hint="Of all positions within the limits at this orientation; certified is a lower bound. "
         "A pair blocks alone the positions at which it collides, and those that it cuts off from "

@@ -14,13 +14,13 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, TETRAHEDRA
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import UNITS, Unit, format_number
 from explorer.singularity.ellipsoids import Performance, SingularityFreeBall
 from explorer.singularity.freedoms import FreeTurn
 from explorer.singularity.strata import GENERIC, Stratum, describe_stratum, incidences, inversions
 
 VERDICT_HINT = (
-    "The distance is the root-mean-square displacement of b1 to b4 (Nawratil's metric) to the "
+    "The motion is the root-mean-square displacement of b1 to b4 (Nawratil's metric) to the "
     "nearest singular pose, of any position and orientation"
 )
 LOOKS: dict[Kind, block.Look] = {"clear": "within", "near": "close", "singular": "beyond"}
@@ -28,45 +28,48 @@ LARGEST_GAIN = 1e9
 """Gain beyond which a pose counts as singular in a direction: J is known to fewer digits."""
 
 
-def colour_words(warn: Warnings, unit_mm: float) -> str:
+def colour_words(warn: Warnings, unit: Unit) -> str:
     """Return what the colour of an incidence means, given the warning values."""
     return (
         "The colour of an incidence: the least of its measures over their warning values, which "
-        f"are {format_number(warn.margin, 3)} units of the margin, "
-        f"{format_number(warn.distance * unit_mm, 3)} mm of the distance, "
+        f"are {unit.text(warn.margin, 3)} of the margin, "
+        f"{unit.text(warn.distance, 3)} of motion, "
         f"{format_number(math.degrees(warn.turn), 3)}° of turning (a transmission angle, which "
         "mechanisms usually keep above 30° to 45°), and "
         f"{format_number(warn.condition, 3)} of 1/cond J"
     )
 
 
-def margin_table(snapshot: Snapshot) -> block.Table:
-    """Return the three margins, with the distance and the least turn to where each is zero."""
-    reach, unit = snapshot.design.reach, snapshot.design.unit_mm
-    distances = [unit * each.distance for each in snapshot.nearest]
+def margin_table(snapshot: Snapshot, unit: Unit | None = None) -> block.Table:
+    """Return the three margins, with the motion and the least turn to where each is zero.
+
+    Lengths are in mm unless another unit is given; where there is room, in design units too.
+    """
+    unit, reach = unit or snapshot.design.millimetres, snapshot.design.reach
+    name, size = f" {unit.name}", unit.factor * reach
+    motions = [unit.factor * each.distance for each in snapshot.nearest]
     turns = [
-        math.degrees(turn) if distance > 0.0 else 0.0
-        for turn, distance in zip(snapshot.least_turns, distances, strict=True)
+        math.degrees(turn) if motion > 0.0 else 0.0
+        for turn, motion in zip(snapshot.least_turns, motions, strict=True)
     ]
     margins = snapshot.margins
     return block.Table(
         "Margins",
         (
-            block.Names("margin", [f"δ{number}" for number in (1, 2, 3)]),
-            block.Column("δ", margins.tolist(), " units", size=reach, span=reach,
-                         hint="The margin: zero where the mechanism is singular. δ1 and δ3 are "
-                         "distances, δ2 is the mutual moment of two lines, a distance times a "
-                         "sine. Its sign is that of the mode."),
-            block.Column("δ", (unit * margins).tolist(), " mm", size=unit * reach,
-                         span=unit * reach, wide=True),
-            block.Column("distance", distances, " mm", 5, span=unit * reach,
+            block.Names("", [f"δ{number}" for number in (1, 2, 3)]),
+            block.Column("margin", margins.tolist(), " units", size=reach, span=reach, wide=True),
+            block.Column("margin", (unit.factor * margins).tolist(), name, size=size, span=size,
+                         hint="Zero where the mechanism is singular. δ1 and δ3 are distances, δ2 "
+                         "is the mutual moment of two lines, a distance times a sine. Its sign is "
+                         "that of the mode."),
+            block.Column("motion", motions, name, 5, span=size,
                          hint="To the nearest pose with δ = 0: the root-mean-square displacement "
                          "of b1 to b4 (Nawratil's metric)."),
             block.Column("turn", turns, "°", 3, span=90.0,
                          hint="The least turn about b4 or a1 that leads to δ = 0, a transmission "
                          "angle."),
         ),
-        f"{MARGIN_KINDS}; the signs of the three name the assembly mode. Distances are the "
+        f"{MARGIN_KINDS}; the signs of the three name the assembly mode. Motions are the "
         "root-mean-square displacement of b1 to b4 (Nawratil's metric), turns the least about b4 "
         "or a1.",
     )  # fmt: skip
@@ -109,10 +112,11 @@ def nearest_poses(snapshot: Snapshot) -> block.Table:
     )
 
 
-def conditioning(snapshot: Snapshot) -> block.Facts:
+def conditioning(snapshot: Snapshot, unit: Unit = UNITS) -> block.Facts:
     """Return the measures of the actuator Jacobian J, the mode and the stratum."""
     worst = int(snapshot.transmissions.argmin())
-    determinant = block.Number(snapshot.determinant, " units³", size=snapshot.design.reach**3)
+    size = snapshot.design.reach**3
+    determinant = block.measured(snapshot.determinant, unit.raised(3, size), size=size)
     return block.Facts(
         "Conditioning",
         (
@@ -268,28 +272,30 @@ def ellipsoids(performance: Performance, point: str) -> Iterator[block.Table]:
         )
 
 
-def free_ball(snapshot: Snapshot, ball: SingularityFreeBall, point: str) -> block.Fact:
+def free_ball(
+    snapshot: Snapshot, ball: SingularityFreeBall, point: str, unit: Unit | None = None
+) -> block.Fact:
     """Return the radius of the largest ball of positions without a singular one.
 
-    They are the positions of a point of the platform, such as "b4".
+    They are the positions of a point of the platform, such as "b4". Lengths are in mm unless
+    another unit is given.
     """
-    unit = snapshot.design.unit_mm
     hint = f"No position of {point} within this radius is singular at this orientation"
     if snapshot.is_singular:
         return block.Fact("singularity-free radius", f"none: δ{ball.incidence} = 0 here", hint=hint)
     return block.Fact(
         "singularity-free radius",
-        (block.Number(ball.radius, " units"),),
-        (block.Number(ball.radius * unit, " mm", 3), f", to δ{ball.incidence} = 0"),
+        (block.measured(ball.radius, unit or snapshot.design.millimetres),),
+        f"to δ{ball.incidence} = 0",
         hint,
     )
 
 
-def regular_distance(distance: float, unit_mm: float) -> block.Fact:
-    """Return the distance within which no pose is singular."""
+def regular_distance(motion: float, unit: Unit) -> block.Fact:
+    """Return the motion within which no pose is singular."""
     return block.Fact(
         "regular within",
-        (block.Number(distance, " units"),),
-        (block.Number(distance * unit_mm, " mm", 3),),
+        (block.measured(motion, unit),),
+        "of motion",
         "No pose is singular whose b1 to b4 are displaced by less, root mean square",
     )

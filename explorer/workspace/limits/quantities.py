@@ -18,7 +18,7 @@ from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.margins import margins_at
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import Unit, format_number
 from explorer.numerics.vectors import cross3, dot3, minus, norm3, vector
 
 # Quantities, those first that take the least time: b4, the margins, the carriages, their distance,
@@ -315,8 +315,13 @@ class Demand:
         ends = zip((self.low, self.high), self.end_names(), (-1.0, 1.0), strict=True)
         return [end for end in ends if math.isfinite(end[0].value)]
 
-    def text_of(self, value: float, **form: Any) -> str:
-        """Return a value of the quantity in words; `form` as for `format_number`."""
+    def text_of(self, value: float, unit: Unit | None = None, **form: Any) -> str:
+        """Return a value of the quantity in words, a length with its unit if one is given.
+
+        The `form` is as for `format_number`.
+        """
+        if unit is not None and self.has_length:
+            return unit.text(value, **form)
         return f"{format_number(value, **form)}{'°' if self.angle else ''}"
 
     def words(self, unit: float = 1.0) -> str:

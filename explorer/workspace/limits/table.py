@@ -287,7 +287,7 @@ LIMITS: list[Limit] = [
         (
             Number(
                 "margin",
-                f"Minimum of |δ1|, |δ2| and |δ3|, in units; {MARGIN_KINDS}.",
+                f"Minimum of |δ1|, |δ2| and |δ3|; {MARGIN_KINDS}.",
                 lambda design: (0.0, design.reach),
                 free=0.0,
                 least=0.0,

@@ -17,6 +17,7 @@ from explorer.legs.clearance import joined_pairs, radii_of_pairs
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.number_text import Unit
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.quantities import Demand
 from explorer.workspace.limits.table import by_quantity, demands_of, rows_of
@@ -113,14 +114,18 @@ class Violation:
         return (self.demand.high if self.above else self.demand.low).value
 
     def __str__(self) -> str:
+        return self.words()
+
+    def words(self, unit: Unit | None = None) -> str:
+        """Return the violation in words, in which lengths have a unit if one is given."""
         demand = self.demand
-        value = demand.text_of(self.value, size=abs(self.bound))
+        value = demand.text_of(self.value, unit, size=abs(self.bound))
         if demand.is_sign and self.bound == 0.0:
             sign = "negative" if self.above else "positive"
             of = "" if demand.name.endswith(demand.symbol) else f": {demand.symbol}"
             return f"{self.limit}{of} = {value}, but it is {sign} in the home pose"
         relation = "above its maximum" if self.above else "below its minimum"
-        return f"{self.limit} = {value} is {relation} {demand.text_of(self.bound)}"
+        return f"{self.limit} = {value} is {relation} {demand.text_of(self.bound, unit)}"
 
 
 def violations(

@@ -102,12 +102,6 @@ LOOKS = (
         choose("compared.look.shows", "bars", "Compared as"),
     ),
     _look(
-        "Millimetres",
-        "Give lengths in millimetres, rather than in units of the live design.",
-        turn("compared.look.millimetres", "Millimetres"),
-        "mm",
-    ),
-    _look(
         "Overlay workspaces",
         "Draw the workspaces over one another in the colours of the designs, to true size, each "
         "at the orientation of its home.",
@@ -203,17 +197,14 @@ class ComparePanel:
                 f'<div class="ex-flow">{pins}</div>',
             )
         if look.shows == "table":
-            body = table(columns, millimetres=look.millimetres)
+            body = table(columns)
         else:
             legend = "".join(
                 f'<span class="ex-whole">{swatch(column.colour)}'
                 f"<b>{column.letter}</b> {escape(column.design.name)}</span>"
                 for column in columns
             )
-            body = (
-                f'<div class="ex-flow ex-apart">{legend}</div>'
-                f"{bars(columns, millimetres=look.millimetres)}"
-            )
+            body = f'<div class="ex-flow ex-apart">{legend}</div>{bars(columns)}'
         remarks = "".join(
             f'<div class="ex-dim ex-after">{note}</div>' for note in notes(state, columns)
         )

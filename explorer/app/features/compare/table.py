@@ -16,11 +16,13 @@ from explorer.measures.blocks.block import Look
 from explorer.measures.catalogue import CATALOGUE, Measure, Measurements, measures_in
 from explorer.mechanism.design import Design
 from explorer.numerics import number_text
+from explorer.numerics.number_text import Unit
 from explorer.singularity.colours import Rgb
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
 PERCENT = 100.0
+PER_CENT = Unit("%", 1.0)
 # Digits of the largest value of a row, of which four are decimals at most.
 DIGITS, MOST_DECIMALS = 6, 4
 # The measures that begin a group of rows.
@@ -61,7 +63,7 @@ class Column:
         number: Number of the column: 0 for the live design, from 1 for the pinned ones.
         design: The design.
         measured: Values of its measures; None until they are computed.
-        factor: One unit of its lengths in units of the comparison.
+        unit: Unit of lengths in the comparison, of one name for all columns.
         is_current: Whether no newer values are being computed.
         problem: Why something is missing; None if nothing is.
     """
@@ -69,7 +71,7 @@ class Column:
     number: int
     design: Design
     measured: Measurements | None
-    factor: float
+    unit: Unit
     is_current: bool = True
     problem: str | None = None
 
@@ -95,21 +97,25 @@ class Column:
     def value(self, measure: Measure) -> float | None:
         """Return a value in the unit of the comparison; None if it is unknown."""
         value = self.own_value(measure)
-        return None if value is None else value * self.factor**measure.power
+        return None if value is None else value * self.unit_of(measure).factor
+
+    def unit_of(self, measure: Measure) -> Unit:
+        """Return the unit in which a measure is shown."""
+        return PER_CENT if measure.unit == "share" else measure.unit_in(self.unit, math.inf)
 
 
 def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[Column, ...]:
     """Return the columns of the live design and of the pinned ones, given the feed of each."""
     columns: list[Column] = []
-    unit = 1.0 if state.compared.look.millimetres else state.design.unit_mm
     designs = (state.design, *state.compared.pinned)
     for number, (design, feed) in enumerate(zip(designs, feeds, strict=True)):
         if design is not None:
             drawing = drawing_in(number, feed)
             measured = None if drawing is None else drawing.measurements
             problem = feed.problem or (None if drawing is None else drawing.problem)
-            factor = design.unit_mm / unit
-            columns.append(Column(number, design, measured, factor, feed.is_current, problem))
+            ratio = design.unit_mm / state.design.unit_mm
+            unit = Unit(state.unit.name, state.unit.factor * ratio)
+            columns.append(Column(number, design, measured, unit, feed.is_current, problem))
     return tuple(columns)
 
 
@@ -124,16 +130,10 @@ def notes(state: State, columns: tuple[Column, ...]) -> list[str]:
         if column.measured is not None and column.measured.empty_because:
             causes = ", ".join(map(escape, column.measured.empty_because))
             remarks.append(f"{who} has an empty workspace; emptied by: {causes}.")
-    others = [other for other in columns if not math.isclose(other.design.unit_mm, live.unit_mm)]
-    if others:
-        others_units = ", ".join(
-            f"{other.letter} has {number_text.format_number(other.design.unit_mm, 6)} mm"
-            for other in others
-        )
-        unit = "millimetres" if state.compared.look.millimetres else "units of the live design"
+    if state.view.lengths != "mm" and len({column.design.unit_mm for column in columns}) > 1:
         remarks.append(
-            f"One unit of the live design is {number_text.format_number(live.unit_mm, 6)} mm; "
-            f"{others_units}. Lengths are in {unit}, and workspaces are drawn to true size."
+            "Lengths are in units of the live design, of "
+            f"{live.millimetres.text(1.0)}, and workspaces are drawn to true size."
         )
     return remarks
 
@@ -173,29 +173,15 @@ def _size_of(values: list[float | None]) -> float:
     return max((abs(value) for value in values if value is not None), default=0.0)
 
 
-def _unit_of(measure: Measure, *, millimetres: bool) -> str:
-    return "%" if measure.unit == "share" else measure.unit_in("mm" if millimetres else "units")
-
-
 def _hint_of(measure: Measure) -> str:
     return measure.hint if measure.sense is None else f"{measure.hint}; {measure.sense} is better"
 
 
-def table(columns: Sequence[Column], *, millimetres: bool) -> str:
-    """Return the table in HTML, a row for each measure.
-
-    Args:
-        columns: Columns of the comparison, the live design first.
-        millimetres: Whether lengths are in millimetres, rather than in design units.
-    """
+def table(columns: Sequence[Column]) -> str:
+    """Return the table in HTML, a row for each measure; the live design is the first column."""
     head = "".join(_head(column) for column in columns)
     rows = "".join(
-        measure_row(
-            measure,
-            columns,
-            millimetres=millimetres,
-            look="ex-first" if measure.name in FIRSTS else "",
-        )
+        measure_row(measure, columns, look="ex-first" if measure.name in FIRSTS else "")
         for measure in measures_in("compare").values()
         if not measure.needs or any(column.has(measure) for column in columns)
     )
@@ -228,7 +214,6 @@ def measure_row(
     measure: Measure,
     columns: Sequence[Column],
     *,
-    millimetres: bool = False,
     label: str = "",
     hint: str = "",
     look: str = "",
@@ -239,7 +224,6 @@ def measure_row(
     Args:
         measure: The measure.
         columns: Columns of the comparison.
-        millimetres: Whether lengths are in millimetres, rather than in design units.
         label: Name of the row; that of the measure if "".
         hint: Meaning of the row; that of the measure if "".
         look: Classes of the stylesheet for the row.
@@ -260,7 +244,7 @@ def measure_row(
                 text = value_text(measure, value - first, size, signed=True)
             text = f'<span class="ex-{change}">{text}</span>' if change else text
             cells.append(f'<td class="ex-change">{"" if text == "0" else text}</td>')
-    unit = _unit_of(measure, millimetres=millimetres)
+    unit = columns[0].unit_of(measure).name
     unit_html = f' <span class="ex-dim ex-small">{unit}</span>' if unit else ""
     return (
         f'<tr class="{look}" title="{escape(hint or _hint_of(measure))}">'
@@ -285,24 +269,23 @@ def _exact_text(measure: Measure, column: Column) -> str:
         return ""
     if measure.names:
         return value_text(measure, value, value)
-    own = f"{number_text.format_number(value, 12)} {_unit_of(measure, millimetres=False)}".strip()
     if measure.power == 0:
-        return own
-    scaled = value * column.design.unit_mm**measure.power
-    return f"{own} = {number_text.format_number(scaled, 12)} {_unit_of(measure, millimetres=True)}"
+        return column.unit_of(measure).text(value, 12).strip()
+    size, units = column.design.reach**3, (number_text.UNITS, column.design.millimetres)
+    return " = ".join(unit.raised(measure.power, size).text(value, 12) for unit in units)
 
 
-def bars(columns: Sequence[Column], *, millimetres: bool) -> str:
-    """Return some of the measures as bars from zero, in HTML; arguments as of `table`."""
+def bars(columns: Sequence[Column]) -> str:
+    """Return some of the measures as bars from zero, in HTML."""
     drawn = [CATALOGUE[name] for name in DRAWN]
     drawn += [
         CATALOGUE[name] for name in LOADS if any(each.has(CATALOGUE[name]) for each in columns)
     ]
-    drawings = (_drawing(measure, columns, millimetres=millimetres) for measure in drawn)
+    drawings = (_drawing(measure, columns) for measure in drawn)
     return f'<div class="ex-bars">{"".join(drawings)}</div>'
 
 
-def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) -> str:
+def _drawing(measure: Measure, columns: Sequence[Column]) -> str:
     values = [column.value(measure) for column in columns]
     best, size = best_of(measure, values), _size_of(values)
     arrow = {"more": " ↑", "less": " ↓", None: ""}[measure.sense]
@@ -318,7 +301,7 @@ def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) 
         )
         for index, (column, value) in enumerate(zip(columns, values, strict=True))
     ]
-    unit = markup.dim(f"{_unit_of(measure, millimetres=millimetres)}{arrow}")
+    unit = markup.dim(f"{columns[0].unit_of(measure).name}{arrow}")
     return (
         f'<div title="{escape(_hint_of(measure))}"><b>{escape(label)}</b> {unit}'
         f"{markup.table(rows)}</div>"

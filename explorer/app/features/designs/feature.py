@@ -21,6 +21,7 @@ from explorer.app.session.latest import LatestWins
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, MarkSaved, Open, SetName
 from explorer.app.state.frame import Frame
+from explorer.app.state.view import View
 from explorer.app.storage.library import Entry, copy_name
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import PressHandler, open_button, press_button
@@ -30,7 +31,6 @@ from explorer.errors import ExplorerError, InputError
 from explorer.files.json_text import field_names
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
-from explorer.numerics.number_text import format_number
 
 # Byte order marks, the zeros of UTF-16, and blanks.
 BEFORE_JSON = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
@@ -285,10 +285,11 @@ class DesignsPanel:
         live, base = frame.state.design, frame.state.base
         _, words = saved_words(live, self._saved.find(live.name))
         yield self.status, "content", note(words)
-        listed = self._saved.entries, base.name, self.asked
+        view = frame.state.view
+        listed = self._saved.entries, base.name, self.asked, view.lengths
         if listed != self._listed:
             self._listed = listed
-            self._markup = list_designs(rows_of(self._saved.entries), base.name, self.asked)
+            self._markup = list_designs(rows_of(self._saved.entries), base.name, self.asked, view)
         yield self.list, "content", self._markup
         deleted = self._saved.last_deleted
         yield self.restore, "visible", deleted is not None
@@ -333,7 +334,7 @@ def rows_of(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     return (*entries, *(Entry(name, "", design) for name, design in PRESETS.items()))
 
 
-def list_designs(rows: Sequence[Entry], current: str, asked: str | None) -> str:
+def list_designs(rows: Sequence[Entry], current: str, asked: str | None, view: View) -> str:
     """Return the list in HTML, with the buttons of each row.
 
     The open design is marked; the row of the design asked for asks whether to delete it.
@@ -343,12 +344,12 @@ def list_designs(rows: Sequence[Entry], current: str, asked: str | None) -> str:
         '</span><span class="ex-reach">reach |a3|</span><span class="ex-acts"></span></div>'
     )
     lines = "".join(
-        _line(row, is_current=row.name == current, is_asked=row.name == asked) for row in rows
+        _line(row, view, is_current=row.name == current, is_asked=row.name == asked) for row in rows
     )
     return box(head, f'<div class="ex-designs">{lines}</div>')
 
 
-def _line(row: Entry, *, is_current: bool, is_asked: bool) -> str:
+def _line(row: Entry, view: View, *, is_current: bool, is_asked: bool) -> str:
     if row.design is None:
         problem = escape(row.problem or "")
         name = (
@@ -365,11 +366,7 @@ def _line(row: Entry, *, is_current: bool, is_asked: bool) -> str:
             hint=f"Open {row.name}",
             class_name="ex-fill ex-cut",
         )
-        length = row.design.reach
-        reach = (
-            f'{format_number(length)} units <span class="ex-dim">= '
-            f"{format_number(length * row.design.unit_mm)} mm</span>"
-        )
+        reach = view.unit_for(row.design).text(row.design.reach)
         copy = _link("duplicate", row.name, "Duplicate")
     delete = "" if row.name in PRESETS else _link("delete", row.name, "Delete")
     if is_asked:

@@ -198,10 +198,18 @@ class DesignChange:
         old, words = self.before, self._session.history.step.words
         if old is None:
             return ""
+        state = frame.state
+        ratio = state.view.unit_for(old.state.design).factor / state.unit.factor
+
+        def difference(name: str, power: int, before: float | None, now: float | None) -> str:
+            unit = state.unit_of(power)
+            before = None if before is None else before * ratio**power * unit.factor
+            return _difference(name, before, None if now is None else now * unit.factor, unit.name)
+
         lines = [
-            _difference("Volume", _volume(self._then), _volume(self._now), "units³"),
-            _difference("Reach", _reach(old), _reach(frame), "mm"),
-            _difference("Clearance here", _clearance(old), _clearance(frame), "mm"),
+            difference("Volume", 3, _volume(self._then), _volume(self._now)),
+            difference("Reach", 1, old.state.design.reach, frame.state.design.reach),
+            difference("Clearance here", 1, _clearance(old), _clearance(frame)),
         ]
         body = table(lines, head=("", "before", "now", ""))
         return (
@@ -232,14 +240,9 @@ def _difference(name: str, before: float | None, now: float | None, unit: str) -
     return row(f"{name} {dim(unit)}", *texts, words)
 
 
-def _reach(frame: Frame) -> float:
-    design = frame.state.design
-    return design.reach * design.unit_mm
-
-
 def _clearance(frame: Frame) -> float:
     clearances = frame.snapshot.clearances
-    return float(clearances.clearance[int(clearances.closest)]) * frame.state.design.unit_mm
+    return float(clearances.clearance[int(clearances.closest)])
 
 
 class ChangeScene(ScenePart):
@@ -251,13 +254,16 @@ class ChangeScene(ScenePart):
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ghost of this frame."""
-        before, now = self._change.before, placed.frame
-        ratio = 1.0 if before is None else _reach(before) / _reach(now)
-        visible = before is not None and 1.0 / MOST_RATIO <= ratio <= MOST_RATIO
-        yield self._lines, "visible", visible
-        if before is not None and visible:
-            scale = placed.scale * before.state.design.unit_mm / now.state.design.unit_mm
-            yield self._lines, "points", (scale * outline(before.snapshot)).astype(np.float32)
+        before, now = self._change.before, placed.frame.state.design
+        is_visible = False
+        if before is not None:
+            old = before.state.design
+            scale = old.unit_mm / now.unit_mm
+            is_visible = 1.0 / MOST_RATIO <= scale * old.reach / now.reach <= MOST_RATIO
+            if is_visible:
+                lines = placed.scale * scale * outline(before.snapshot)
+                yield self._lines, "points", lines.astype(np.float32)
+        yield self._lines, "visible", is_visible
 
 
 @dataclass(frozen=True)

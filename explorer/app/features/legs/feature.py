@@ -34,7 +34,7 @@ from explorer.measures.blocks.source import pose_source
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import Unit, format_number
 from explorer.singularity.colours import OUTLINE, Rgb
 from explorer.workspace.accessible.radii import RadiusCurve, with_radius
 
@@ -91,8 +91,8 @@ class ClearancePanel:
                 gui,
                 (charts.line("volume", charts.BLUE), *(charts.dots(*mark) for mark in MARKS)),
                 (
-                    charts.axis("radius of all four legs (units)", label_size=20, size=28),
-                    charts.axis("accessible volume (units³)", label_size=18, size=46),
+                    charts.axis("radius of all four legs", label_size=20, size=28),
+                    charts.axis("accessible volume", label_size=18, size=46),
                 ),
                 height=HEIGHT,
                 padding=(8, 14, 0, 0),
@@ -104,7 +104,11 @@ class ClearancePanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         view, drawing = frame.state.view, self._feed.drawing
-        yield self._pose, "content", render(pose_clearances(frame.snapshot), corner=self._copy)
+        yield (
+            self._pose,
+            "content",
+            render(pose_clearances(frame.snapshot, frame.state.unit), corner=self._copy),
+        )
         yield from self._controls.updates(frame)
         yield from show_html(self._move, move_table(frame) if view.swept else "")
         yield from self._under_way.updates()
@@ -114,9 +118,11 @@ class ClearancePanel:
         has_chart = curve is not None and float(curve.radii[-1]) > 0.0
         yield self._chart, "visible", has_chart
         if curve is not None and has_chart:
-            columns = chart_columns(curve, common_radius(frame.state.design))
+            unit, cubic = frame.state.unit, frame.state.unit_of(3)
+            radii, *volumes = chart_columns(curve, common_radius(frame.state.design))
+            columns = unit.factor * radii, *(cubic.factor * each for each in volumes)
             across = {"time": False, "range": (0.0, float(columns[0][-1]))}
-            up = {"range": (0.0, 1.08 * float(curve.volumes[0]))}
+            up = {"range": (0.0, 1.08 * cubic.factor * float(curve.volumes[0]))}
             yield self._chart, "scales", {"x": across, "y": up}
             yield self._chart, "data", columns
 
@@ -127,7 +133,7 @@ def move_table(frame: Frame) -> str:
     if move is None:
         words = "No move yet. Move the platform: a drag without a pause is one move."
         return render([Statement("", words)])
-    return render(move_clearances(move, frame.state.design))
+    return render(move_clearances(move, frame.state.design, frame.state.unit))
 
 
 def common_radius(design: Design) -> float | None:
@@ -179,20 +185,21 @@ def radius_words(frame: Frame, feed: Feed[Selection, RadiusCurve | Trouble]) -> 
         return alert("Nothing is accessible, even without radii", sentence(curve.reason)) + note
     if float(curve.volumes[0]) <= 0.0:
         return box(dim(f"The workspace is empty.{note}"))
-    design = frame.state.design
+    design, unit = frame.state.design, frame.state.unit
     radii = marked_radii(curve, common_radius(design))
     rows = (
-        _row(name, colour, radius, curve, design.unit_mm)
+        _row(name, colour, radius, curve, unit)
         for (name, colour, _), radius in zip(MARKS, radii, strict=True)
     )
     return box(
-        f'<div class="ex-line"><b>Accessible volume</b>{note}</div>',
+        f'<div class="ex-line"><b>Accessible volume ({frame.state.unit_of(3).name}) over the '
+        f"radius ({unit.name})</b>{note}</div>",
         table(rows),
-        f'<div class="ex-dim ex-after">{first_collision(curve, design.reach)}</div>',
+        f'<div class="ex-dim ex-after">{first_collision(curve, design.reach, unit)}</div>',
     )
 
 
-def first_collision(curve: RadiusCurve, reach: float) -> str:
+def first_collision(curve: RadiusCurve, reach: float, unit: Unit) -> str:
     """Return a sentence on the legs that collide first as their radii grow, and where."""
     least = curve.least
     closest = float(least.clearance.min())
@@ -200,7 +207,7 @@ def first_collision(curve: RadiusCurve, reach: float) -> str:
         return "No two legs can meet."
     first = np.flatnonzero(least.clearance <= closest).tolist()
     meetings = "; ".join(
-        f"legs {PAIRS[pair][0]} and {PAIRS[pair][1]} at {_position(least.position[pair])}"
+        f"legs {PAIRS[pair][0]} and {PAIRS[pair][1]} at {_position(least.position[pair], unit)}"
         for pair in first
     )
     if closest > 0.0:
@@ -210,30 +217,31 @@ def first_collision(curve: RadiusCurve, reach: float) -> str:
     return f"Even without radii legs touch within the limits{where}: {meetings}."
 
 
-def _row(name: str, colour: Rgb, radius: float | None, curve: RadiusCurve, unit_mm: float) -> str:
+def _row(name: str, colour: Rgb, radius: float | None, curve: RadiusCurve, unit: Unit) -> str:
     value, note = "they differ", ""
     if radius is not None:
-        value, note = format_number(radius, 3), f"{format_number(radius * unit_mm, 3)} mm"
+        value = unit.text(radius, 3)
         if name == MARKS[0][0]:
             share = float(volume_at(curve, radius) / curve.volumes[0])
             note = f"{format_number(100.0 * share, 3)} %"
     return row(f"{swatch(colour, 'ex-dot')}{name}", value, dim(note))
 
 
-def _position(position: FloatArray) -> str:
+def _position(position: FloatArray, unit: Unit) -> str:
     rounded = np.round(position, 6) + 0.0
-    return "(" + ", ".join(format_number(float(x), 3) for x in rounded) + ")"
+    texts = ", ".join(format_number(unit.factor * float(x), 3) for x in rounded)
+    return f"({texts}) {unit.name}"
 
 
 def clearance_figure(frame: Frame) -> str:
     """Return the clearance of the closest legs in the pose, as HTML."""
-    clearances, design = frame.snapshot.clearances, frame.state.design
+    clearances, state = frame.snapshot.clearances, frame.state
     closest = int(clearances.closest)
-    clearance = float(clearances.clearance[closest]) * design.unit_mm
-    words = f"{format_number(clearance, 3, size=design.unit_mm * design.reach)} mm"
+    clearance = float(clearances.clearance[closest])
+    words = state.unit.text(clearance, 3, size=state.design.reach)
     pair = pair_name(PAIRS[closest])
     hint = f"Clearance of the closest legs, {pair}: distance of their axes less their radii."
-    if not any(design.limits.leg_radii):
+    if not any(state.design.limits.leg_radii):
         words += f" {dim('axes only')}"
         hint = f"Distance of the axes of the closest legs, {pair}: the design states no radii."
     look = "ex-beyond" if clearance < 0.0 else ""
@@ -269,7 +277,8 @@ class ClearanceScene(ScenePart):
             ends = placed.scale * clearances.points[pair]
             yield self._line, "points", ends[None].astype(np.float32)
             yield self._label, "position", tuple(ends.mean(axis=0).tolist())
-            clearance = format_number(float(clearances.clearance[pair]), 3, size=state.design.reach)
+            least = float(clearances.clearance[pair])
+            clearance = state.unit.text(least, 3, size=state.design.reach)
             yield self._label, "text", f"legs {pair_name(PAIRS[pair])}: {clearance}"
 
 

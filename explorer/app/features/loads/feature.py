@@ -59,14 +59,12 @@ class ForcesPanel:
                     lambda _, force: load.SetForce(force),
                 ),
                 step=0.1,
-                small=True,
             )
             controls.triple(
                 "Moment (N m)",
                 "Moment on the platform, about x, y and z of the base.",
                 "view.forces.moment",
                 step=0.01,
-                small=True,
             )
             controls.dropdown(
                 "Weights",

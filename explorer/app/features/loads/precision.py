@@ -109,7 +109,6 @@ class PrecisionPanel:
                 _zero_for_none("view.precision.wanted"),
                 least=0.0,
                 step=0.01,
-                small=True,
                 visible=lambda state: state.view.precision.budget,
             )
             controls.number(
@@ -118,7 +117,6 @@ class PrecisionPanel:
                 _zero_for_none("view.precision.wanted_turn"),
                 least=0.0,
                 step=0.01,
-                small=True,
                 visible=_is_wanted,
             )
             controls.checkbox(

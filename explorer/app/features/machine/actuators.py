@@ -37,7 +37,7 @@ class MachineControls(Controls):
         visible: Condition | None = None,
     ) -> None:
         """Add a field for a number from 0 on; values far below its step count too."""
-        self.number(label, hint, at, least=0.0, step=step, visible=visible, small=True)
+        self.number(label, hint, at, least=0.0, step=step, visible=visible)
 
     def switch(
         self,

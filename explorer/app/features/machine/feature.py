@@ -27,7 +27,7 @@ from explorer.mechanism.design import DOWN, Design
 from explorer.mechanism.machine import Actuators, Struts, Tolerances, Tool
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import Unit, format_number
 
 # Limits that are switched on begin with these: N m and MPa; the tube in mm.
 MOMENT, STRESS = 10.0, 200.0
@@ -78,7 +78,7 @@ class MachinePanel:
         gui = services.gui
         self._controls = controls = MachineControls(gui, services.session)
         self._summary = gui.add_html("")
-        with gui.add_folder("Tool on the platform (design units, degrees)"):
+        with controls.folder("Tool on the platform ({unit}, degrees)"):
             self._add_point("tool", "the tool point", "design.tool.position")
             for axis, (name, about, edge) in enumerate(ANGLES):
                 controls.slider(
@@ -87,7 +87,7 @@ class MachinePanel:
                     item(lambda frame: frame.state.tool_angles, axis, SetToolAngle),
                     Span(-edge, edge, 0.1),
                 )
-        with gui.add_folder("Payload (design units, kg, N)"):
+        with controls.folder("Payload ({unit}, kg, N)"):
             controls.field(
                 "Mass (kg)",
                 "Mass that the platform carries.",
@@ -115,8 +115,9 @@ class MachinePanel:
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
-        design = frame.state.design
-        yield self._summary, "content", box(_with_units(machine_words(design)))
+        state = frame.state
+        design = state.design
+        yield self._summary, "content", box(_with_units(machine_words(design, state.unit)))
         weight = design.payload.weight_n
         words = note(f"Its weight is {format_number(weight)} N.") if weight > 0.0 else ""
         yield from show_html(self._weight, words)
@@ -130,6 +131,7 @@ class MachinePanel:
                 f"The {letter} coordinate of {point} in the platform frame, from b4.",
                 f"{path}.{axis}",
                 platform_span,
+                power=1,
             )
 
     def _add_gravity(self) -> None:
@@ -222,7 +224,6 @@ class MachinePanel:
                 f"Tolerance of {name}, along the axes of the {body}.",
                 f"design.tolerances.{name}",
                 step=FINE,
-                small=True,
             )
         for index, axis in enumerate("yz"):
             hint = f"Tolerance of the guide's turn about {axis} through a1."
@@ -253,8 +254,8 @@ SAME_DIRECTION = 1e-12
 DIGITS = 3
 
 
-def machine_words(design: Design) -> str:
-    """Return a line on the machine of a design, such as "Tool 3 units from b4; carries 2 kg"."""
+def machine_words(design: Design, unit: Unit) -> str:
+    """Return a line on the machine of a design, such as "Tool 30 mm from b4; carries 2 kg"."""
     payload, guide, moment = design.payload, design.guide, design.struts.largest_moment
     carried = _all_of((payload.mass_kg, "", "kg"), (payload.force_n, "a force of ", "N"))
     bears = _all_of((guide.force_n, "", "N"), (guide.moment_nm, "", "N m"))
@@ -263,7 +264,7 @@ def machine_words(design: Design) -> str:
         "struts": f"struts up to {_text(moment)} N m" if math.isfinite(moment) else "",
         "guide": f"guide up to {bears}" if bears else "",
     }
-    parts = [_tool_words(design.tool), f"carries {carried or 'nothing'}"]
+    parts = [_tool_words(design.tool, unit), f"carries {carried or 'nothing'}"]
     if design.gravity != DOWN:
         along = f"along ({', '.join(map(_text, design.gravity))})"
         parts.append(f"gravity {direction_name(design.gravity) or along}")
@@ -280,13 +281,13 @@ def _all_of(*values: tuple[float | None, str, str]) -> str:
     return " and ".join(f"{before}{_text(value)} {unit}" for value, before, unit in values if value)
 
 
-def _tool_words(tool: Tool) -> str:
+def _tool_words(tool: Tool, unit: Unit) -> str:
     w, *axis = tool.quaternion
     distance = math.hypot(*tool.position)
     turn = math.degrees(2.0 * math.atan2(math.hypot(*axis), abs(w)))
     if distance == 0.0 and turn == 0.0:
         return "no tool"
-    place = "at b4" if distance == 0.0 else f"{_text(distance)} units from b4"
+    place = "at b4" if distance == 0.0 else f"{unit.text(distance, DIGITS)} from b4"
     return f"tool {place}" + (f", turned by {_text(turn)}°" if turn else "")
 
 

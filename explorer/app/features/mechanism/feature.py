@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from typing import get_args
 
 import viser
 
@@ -25,12 +26,13 @@ from explorer.app.features.mechanism.sketch import sketch
 from explorer.app.inputs import ranges
 from explorer.app.inputs.controls import Bound, Controls, item
 from explorer.app.inputs.limits import bound_entry, bound_switch, limit_span
-from explorer.app.inputs.ranges import Span
+from explorer.app.inputs.ranges import Intervals, Span
 from explorer.app.state import actions
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import Hold, State
+from explorer.app.state.view import LengthName
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chip, Chips, Effect
@@ -100,6 +102,7 @@ class MovePanel:
                     f"The {name} coordinate of b4 or of the tool point in the base frame.",
                     item(lambda frame: frame.state.position, axis, actions.SetPosition),
                     partial(ranges.position_span, axis=axis),
+                    power=1,
                     visible=_is_by_position,
                 )
             for axis, (name, order, edge) in enumerate(ANGLES):
@@ -116,8 +119,9 @@ class MovePanel:
                     hint,
                     item(lambda frame: frame.state.joints, joint, actions.SetJoint),
                     partial(ranges.joint_span, joint=joint),
-                    tinted=lambda frame, joint=joint: frame.snapshot.intervals[joint],
+                    tinted=partial(closing_values, joint=joint),
                     closes_up=True,
+                    power=1,
                     visible=_is_by_lengths,
                 )
             add_fold_sliders(controls)
@@ -142,7 +146,7 @@ class MovePanel:
         """Yield the updates that make the panel show the frame."""
         state, unclosed = frame.state, frame.state.unclosed
         sliders = COORDINATES[state.view.coordinates][0]
-        units = "design units" if _is_by_lengths(state) else "design units, degrees"
+        units = state.unit.name if _is_by_lengths(state) else f"{state.unit.name}, degrees"
         buttons, points = self._coordinates.buttons(state), box(self._points.html(state))
         switch = f'<div class="ex-segments" role="toolbar" aria-label="Set by">{buttons}</div>'
         yield self._switch, "content", switch + points * _is_by_position(state)
@@ -154,6 +158,12 @@ class MovePanel:
         yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
         yield from self._controls.updates(frame)
         yield from self._modes.updates(frame)
+
+
+def closing_values(frame: Frame, joint: int) -> Intervals:
+    """Return the values of a joint at which the lengths close, in the unit of the view."""
+    unit = frame.state.unit.factor
+    return tuple((unit * low, unit * high) for low, high in frame.snapshot.intervals[joint])
 
 
 def _is_by_position(state: State) -> bool:
@@ -188,7 +198,7 @@ def _choice(
 def message(state: State) -> str:
     """Return the message on the lengths of the legs as HTML, in a box of constant height."""
     if state.unclosed is not None:
-        text = alert("", str(state.unclosed))
+        text = alert("", state.unclosed.words(state.unit))
     elif state.remark is not None:
         text = remark("", state.remark)
     else:
@@ -224,7 +234,7 @@ class DesignPanel:
                 actions.Reset,
                 icon=viser.Icon.RESTORE,
             )
-        with gui.add_folder("Design variables (design units)"):
+        with controls.folder("Design variables ({unit})"):
             self._sketch = gui.add_html("")
             for index, name in enumerate(VARIABLES):
                 controls.slider(
@@ -235,6 +245,7 @@ class DesignPanel:
                         lambda _, value, name=name: actions.SetVariable(name, value),
                     ),
                     partial(ranges.variable_span, index=index),
+                    power=1,
                 )
             controls.number(
                 "1 unit (mm)",
@@ -243,15 +254,22 @@ class DesignPanel:
                 least=1e-6,
                 step=0.001,
             )
-        with gui.add_folder("Limits (design units)", expand_by_default=False):
+            controls.dropdown(
+                "Lengths in",
+                "Unit in which lengths are shown and typed, here and everywhere on the page.",
+                get_args(LengthName),
+                "view.lengths",
+            )
+        with controls.folder("Limits ({unit})", is_open=False):
             self._add_limits(in_degrees=False)
-        with gui.add_folder("Radii of the legs (design units)", expand_by_default=False):
+        with controls.folder("Radii of the legs ({unit})", is_open=False):
             for leg in range(4):
                 controls.slider(
                     f"leg {leg + 1}",
                     f"Radius of leg {leg + 1}, a capsule about its axis.",
                     f"design.limits.leg_radii.{leg}",
                     ranges.radius_span,
+                    power=1,
                 )
         with gui.add_folder("Swing of the joints (°)", expand_by_default=False):
             self._add_limits(in_degrees=True)
@@ -281,6 +299,7 @@ class DesignPanel:
             entry.hint,
             bound_entry(limit, entry),
             lambda state: limit_span(state.base, entry),
+            power=int(not entry.is_angle),
             disabled=lambda state: limit.switch is not None and limit.value(state.design) is None,
         )
 
@@ -292,7 +311,7 @@ def _preset_name(frame: Frame) -> str:
 
 def limits_figure(frame: Frame) -> str:
     """Return how many limits the pose breaks, as HTML."""
-    broken = [str(each) for each in frame.snapshot.violations]
+    broken = [each.words(frame.state.unit) for each in frame.snapshot.violations]
     if broken:
         words, look, hint = f"{len(broken)} broken", "ex-beyond", "; ".join(broken)
         hint = f"Outside the limits: {hint}."
@@ -332,5 +351,5 @@ MECHANISM = Feature(
         "Pose › Home pose": (Key("H"),),
         "Pose › Use the nearest length": (Key("U"),),
     },
-    lists=("Preset", "On a change"),
+    lists=("Preset", "On a change", "Lengths in"),
 )

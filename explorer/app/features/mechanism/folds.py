@@ -69,8 +69,11 @@ def add_fold_sliders(controls: Controls) -> None:
             HINTS[index],
             item(lambda frame: frame.folds, index, SetFold),
             partial(fold_span, index=index),
+            power=int(index == 0),
             visible=lambda state: state.view.coordinates == "folds",
-            coloured=lambda frame, span, index=index: colour_stops(frame, index, span),
+            coloured=lambda frame, span, index=index: colour_stops(
+                frame, index, frame.state.unit.read(span.high)
+            ),
         )
 
 
@@ -84,12 +87,15 @@ def fold_span(state: State, index: int) -> Span:
     return Span(0.0, HALF_TURN, STEP) if is_positive else Span(-HALF_TURN, 0.0, STEP)
 
 
-def colour_stops(frame: Frame, index: int, span: Span) -> str:
-    """Return the colours along the track of one of `FOLDS`, as stops of a CSS gradient."""
+def colour_stops(frame: Frame, index: int, most: float) -> str:
+    """Return the colours along the track of one of `FOLDS`, as stops of a CSS gradient.
+
+    The track of r ends at `most`, in design units.
+    """
     r, *angles = frame.folds
     factors = (r, *(abs(math.sin(math.radians(angle))) for angle in angles))
     # The largest value of a margin along the track: that where its own factor is r's end, or 1.
-    largest = span.high if index == 0 else 1.0
+    largest = most if index == 0 else 1.0
     peak = min(
         largest * math.prod(factors[each] for each in margin if each != index)
         for margin in FACTORS

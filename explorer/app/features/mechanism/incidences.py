@@ -308,14 +308,14 @@ def visible_gaps(placed: Placed, hovered: int | None) -> dict[int, Approach]:
 
 
 def gap_text(placed: Placed, index: int, approach: Approach) -> str:
-    """Return the text beside a gap, such as "δ1 −0.42 · 4.2 mm"."""
-    snapshot = placed.frame.snapshot
-    reach, unit_mm = snapshot.design.reach, snapshot.design.unit_mm
+    """Return the text beside a gap, such as "δ1 −4.2 · 4.2 mm"."""
+    snapshot, unit = placed.frame.snapshot, placed.frame.state.unit
+    reach = unit.factor * snapshot.design.reach
     if approach.level == 0.0:
         return f"δ{index + 1} = 0{'' if approach.is_touching else ', lines parallel'}"
-    margin = format_fitted(float(snapshot.margins[index]), reach, 4)
-    length = format_fitted(snapshot.gaps.lengths[index] * unit_mm, reach * unit_mm, 4)
-    return f"δ{index + 1} {margin} · {length} mm"
+    margin, gap = float(snapshot.margins[index]), snapshot.gaps.lengths[index]
+    margin, gap = (format_fitted(unit.factor * each, reach, 4) for each in (margin, gap))
+    return f"δ{index + 1} {margin} · {gap} {unit.name}"
 
 
 @functools.cache

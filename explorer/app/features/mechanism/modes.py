@@ -21,7 +21,7 @@ from explorer.app.widgets.palette import Key
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_fitted
+from explorer.numerics.number_text import Unit, format_fitted
 from explorer.workspace.limits.valid_poses import Violation
 
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
@@ -89,12 +89,13 @@ def modes_table(frame: Frame, switch: str) -> str:
 
 
 def _row(frame: Frame, mode: int) -> str:
-    modes, reach = frame.snapshot.modes, frame.state.design.reach
-    there = modes.position[mode] + frame.state.offset(modes.rotation[mode])
-    place = "".join(f"<span>{format_fitted(x, reach, 3)}</span>" for x in there.tolist())
+    modes, reach, unit = frame.snapshot.modes, frame.state.design.reach, frame.state.unit
+    there = unit.factor * (modes.position[mode] + frame.state.offset(modes.rotation[mode]))
+    size = unit.factor * reach
+    place = "".join(f"<span>{format_fitted(x, size, 3)}</span>" for x in there.tolist())
     # The modes of a singular pose are all singular, so that none of them looks safe.
     look = "" if frame.snapshot.is_singular else "ex-within"
-    limits, hint = _limits(frame.snapshot.mode_violations[mode], look)
+    limits, hint = _limits(frame.snapshot.mode_violations[mode], look, unit)
     name = f"Mode {mode}, {mode_name(mode)}"
     return press_button(
         GO,
@@ -108,15 +109,14 @@ def _row(frame: Frame, mode: int) -> str:
     )
 
 
-def _limits(broken: tuple[Violation, ...], look: str) -> tuple[str, str]:
+def _limits(broken: tuple[Violation, ...], look: str, unit: Unit) -> tuple[str, str]:
     """Return the cell and the sentence on limits that are broken; `look` if none is."""
     if not broken:
         return f'<span class="{look}">within</span>', "It is within all limits."
     first = broken[0].limit
     words = SHORT.get(first, first.removeprefix("margin ").removeprefix("swing "))
     more = f" +{len(broken) - 1}" if len(broken) > 1 else ""
-
-    sentences = "; ".join(map(str, broken))
+    sentences = "; ".join(each.words(unit) for each in broken)
     return f'<span class="ex-beyond">{escape(words)}{more}</span>', f"{sentences}."
 
 

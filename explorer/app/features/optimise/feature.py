@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from html import escape
 from itertools import zip_longest
 
@@ -17,7 +18,7 @@ from explorer.app.features.optimise.actions import SetObjective, SetRequest
 from explorer.app.features.optimise.buttons import ACCEPT, BUTTONS, PAPER, add_buttons, button
 from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest, SearchRun
-from explorer.app.features.optimise.words import result_words, search_notice
+from explorer.app.features.optimise.words import goal_unit, result_words, search_notice
 from explorer.app.features.optimise.work import complete_request, requested_box
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.inputs.controls import At, Bound, Controls
@@ -34,8 +35,8 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
-from explorer.numerics.number_text import format_number
-from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
+from explorer.numerics.number_text import Unit, format_number
+from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
 from explorer.optimise.problem import OVER_BOX, YAW, Box, ObjectiveName, Problem
 from explorer.singularity.colours import css
 from explorer.statics.compliance import is_elastic
@@ -72,7 +73,7 @@ class OptimisePanel:
         add_buttons(services)
         self._controls = Controls(gui, services.session)
         gui.add_html(COLUMNS)
-        with gui.add_folder("Problem, in design units"):
+        with gui.add_folder("Problem"):
             self._add_problem()
             with gui.add_folder("Free variables", expand_by_default=False):
                 for name, hint in FREE.items():
@@ -84,7 +85,7 @@ class OptimisePanel:
         """Yield the updates that show a frame."""
         yield from self._controls.updates(frame)
         yield self._result, "content", result_words(frame.state, self._verdict.html())
-        yield from self._plots.updates(Optimisation.of(frame.state).run)
+        yield from self._plots.updates(frame.state)
 
     def _add_problem(self) -> None:
         controls = self._controls
@@ -97,20 +98,19 @@ class OptimisePanel:
         self._add_number(
             "volume",
             "volume",
-            "The exact volume of the workspace, in units³, at the orientation of home: to match, "
-            "or at least.",
+            "The exact volume of the workspace, at the orientation of home: to match, or at least.",
             visible=lambda state: _request(state).needs_volume,
         )
         self._add_number(
             "reach",
             "longest_leg",
-            "The largest maximum length of l1, d2, d4 and l4 allowed, in units.",
+            "The largest maximum length of l1, d2, d4 and l4 allowed.",
             visible=lambda state: _request(state).needs_reach,
         )
         self._add_number(
             "clearance",
             "demanded_clearance",
-            "The least clearance of any two legs, their radii taken off, in units, wherever in the "
+            "The least clearance of any two legs, their radii taken off, wherever in the "
             "workspace all margins are at least a 20th of the reach that the search starts with; 0 "
             "for no demand.",
         )
@@ -140,7 +140,7 @@ class OptimisePanel:
             "error",
             "worst_error",
             "The worst displacement of the tool by the actuators' errors allowed in the required "
-            "box, in units; 0 for no demand.",
+            "box; 0 for no demand.",
             # A demand that another design left behind can be taken back.
             visible=lambda state: any(state.design.actuators.error_mm) or _request(state).error > 0,
         )
@@ -148,7 +148,7 @@ class OptimisePanel:
             "deflection",
             "deflection",
             "The largest displacement of the tool under the payload's weight and force allowed in "
-            "the required box, in units; 0 for no demand.",
+            "the required box; 0 for no demand.",
             visible=lambda state: is_elastic(state.design) or _request(state).deflection > 0,
         )
         self._add_number(
@@ -159,7 +159,7 @@ class OptimisePanel:
             step=1.0,
         )
         for end, word in enumerate(("from", "to")):
-            self._add_corner(end, f"Box {word}")
+            self._add_corner(end, f"Box {word} ({{unit}})")
 
     def _add_number(
         self,
@@ -176,9 +176,9 @@ class OptimisePanel:
             default=lambda state: getattr(complete_request(state), field),
             action=SetRequest,
         )
-        unit = " (°)" if CATALOGUE[measure].unit == "°" else ""
-        label = f"{CATALOGUE[measure].label.capitalize()}{unit}"
-        self._controls.number(label, hint, at, least=0.0, step=step, visible=visible)
+        power, unit = CATALOGUE[measure].power, CATALOGUE[measure].unit
+        label = f"{CATALOGUE[measure].label.capitalize()} ({'{unit}' if power else unit})"
+        self._controls.number(label, hint, at, least=0.0, step=step, power=power, visible=visible)
 
     def _add_corner(self, end: int, label: str) -> None:
         def write(state: State, value: Triple) -> Action:
@@ -191,6 +191,7 @@ class OptimisePanel:
             "A corner of the box, in the base frame.",
             Bound(lambda frame: requested_box(frame.state)[end], write),
             step=STEP,
+            power=1,
             visible=lambda state: _request(state).needs_box,
         )
 
@@ -236,8 +237,9 @@ class OptimisePlots:
                 for _ in range(3)
             ]
 
-    def updates(self, run: SearchRun | None) -> Iterator[Update]:
-        """Yield the updates that show a run."""
+    def updates(self, state: State) -> Iterator[Update]:
+        """Yield the updates that show the run of a state."""
+        run = Optimisation.of(state).run
         iterates = [] if run is None else charted_iterates(run)
         drawn = [] if run is None or not iterates else curves_of(run.problem, iterates)
         yield self._folder, "visible", bool(drawn)
@@ -245,10 +247,13 @@ class OptimisePlots:
             yield caption, "visible", curve is not None
             yield chart, "visible", curve is not None
             if run is not None and curve is not None:
-                name = escape(_name(run.problem, iterates[-1], curve))
+                unit = _unit_of(run.problem, curve, state)
+                level = None if curve.level is None else unit.factor * curve.level
+                shown = replace(curve, values=unit.factor * curve.values, level=level)
+                name = escape(_name(run.problem, iterates[-1], shown, unit))
                 yield caption, "content", f'<div class="ex-note ex-dim ex-cut">{name}</div>'
-                yield chart, "scales", _scales(curve)
-                yield chart, "data", data_of(curve)
+                yield chart, "scales", _scales(shown)
+                yield chart, "data", data_of(shown)
 
 
 def charted_iterates(run: SearchRun) -> list[Iterate]:
@@ -259,19 +264,25 @@ def charted_iterates(run: SearchRun) -> list[Iterate]:
     return [iterate for iterate in run.iterates if iterate.run == start]
 
 
-def _name(problem: Problem, last: Iterate, curve: Curve) -> str:
-    """Return the name of the values of a curve, with the last one."""
+def _unit_of(problem: Problem, curve: Curve, state: State) -> Unit:
+    if curve.kind == "volume":
+        return state.unit_of(3)
+    is_plain = curve.kind == "spare" or curve.powers
+    return Unit("", 1.0) if is_plain else goal_unit(problem, state)
+
+
+def _name(problem: Problem, last: Iterate, curve: Curve, unit: Unit) -> str:
+    """Return the name of the values of a curve, with the last one in a unit."""
     if curve.kind == "spare":
         return f"Worst constraint, broken below 0: {last.worst or 'none'}"
     if curve.kind == "volume":
         target = "" if curve.level is None else f", required {format_number(curve.level, 6)}"
-        return f"Volume (units³): {format_number(last.volume, 6)}{target}"
+        return f"Volume: {unit.text(last.volume, 6)}{target}"
     if curve.powers:
         value = format_number(last.value, 2, size=1.0)
         return f"log10 of F = |1 − V / V′|; F = {value}"
     name = OBJECTIVE_SYMBOLS[problem.objective].capitalize()
-    unit = CATALOGUE[GOALS[problem.objective]].unit_in("units")
-    return f"{name}{f' ({unit})' if unit else ''}: {format_number(last.value, 6)}"
+    return f"{name}: {unit.text(last.value, 6)}"
 
 
 def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:

@@ -11,12 +11,13 @@ from explorer.app.features.optimise import buttons, work
 from explorer.app.features.optimise.actions import LiftLimit
 from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
 from explorer.app.state.state import State
+from explorer.app.state.view import View
 from explorer.app.widgets import markup
 from explorer.measures.blocks.block import Look
 from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.measure import CERTAIN
 from explorer.mechanism.design import VARIABLES, Design
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise import problem as problems
 from explorer.optimise.conflicts import Conflict
 from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Iterate
@@ -65,7 +66,7 @@ def search_notice(state: State) -> Notice | None:
     if not state.optimisation.is_on:
         if run.verdict is None or run.best is None or run.accepted:
             return None
-        value = _reached_text(run.problem, run.best)
+        value = _reached_text(run.problem, run.best, state)
         return Notice(TITLES[run.verdict.status], value, None, (buttons.ACCEPT, buttons.REVERT))
     if run.phase == "cancelling":
         return Notice("Cancelling …", "", None, (buttons.CANCEL,))
@@ -77,21 +78,26 @@ def search_notice(state: State) -> Notice | None:
     broken = f", broken: {last.worst}" if last.spare < 0.0 else ""
     return Notice(
         f"{start}{last.phase} {step}".capitalize(),
-        f"{_reached_text(run.problem, last)}{broken}",
+        f"{_reached_text(run.problem, last, state)}{broken}",
         last.run / run.starts if run.starts > 1 else None,
         (buttons.CANCEL,),
     )
 
 
-def _reached_text(problem: problems.Problem, iterate: Iterate) -> str:
+def _reached_text(problem: problems.Problem, iterate: Iterate, state: State) -> str:
     """Return what a search has reached: the volume that it matches, or the objective."""
     if problem.objective == "match-volume":
-        return f"volume {format_number(iterate.volume, 5)} units³"
+        return f"volume {state.unit_of(3).text(iterate.volume, 5)}"
     name = OBJECTIVE_SYMBOLS[problem.objective]
     if iterate.objective is None:
         return f"{name} infinite"
-    unit = CATALOGUE[GOALS[problem.objective]].unit_in("units")
-    return f"{name} {format_number(iterate.objective, 6)} {unit}"
+    return f"{name} {goal_unit(problem, state).text(iterate.objective, 6)}"
+
+
+def goal_unit(problem: problems.Problem, state: State) -> Unit:
+    """Return the unit in which the objective of a problem is shown."""
+    goal = CATALOGUE[GOALS[problem.objective]]
+    return goal.unit_in(state.unit, state.design.reach**3)
 
 
 def result_words(state: State, built: str = "") -> str:
@@ -108,7 +114,7 @@ def result_words(state: State, built: str = "") -> str:
             f"{buttons.button(buttons.CANCEL, state)}</div>",
             f'<div class="ex-dim ex-cut">{escape(notice.text) or "&nbsp;"}</div>',
             "" if notice.share is None else markup.meter(100.0 * notice.share),
-            limits_table(state.design),
+            limits_table(state.design, state.unit),
         )
     refusals, limits = work.find_refusals(state), work.liftable_limits(state)
     remedies = "".join(
@@ -142,14 +148,15 @@ def result_words(state: State, built: str = "") -> str:
         acts = accept + buttons.button(buttons.REVERT, state) + acts
     found = ""
     if run is not None and has_result:
-        found = f'<div class="ex-after">{built}</div>{_downloads(state)}{comparison_table(run)}'
+        compared = comparison_table(run, state.view)
+        found = f'<div class="ex-after">{built}</div>{_downloads(state)}{compared}'
     return markup.box(
         verdict,
         refused_words(why, refusals, limits) if refusals else "",
         f'<div class="ex-flow ex-before">{remedies}</div>' if remedies else "",
         f'<div class="ex-flow ex-before">{acts}</div>',
         found,
-        limits_table(state.design),
+        limits_table(state.design, state.unit),
     )
 
 
@@ -194,11 +201,14 @@ def verdict_words(state: State, run: SearchRun, verdict: SearchResult) -> str:
     )
 
 
-def comparison_table(run: SearchRun) -> str:
+def comparison_table(run: SearchRun, view: View) -> str:
     """Return the user's own design and the best one side by side, as HTML."""
     if run.comparison is None:
         return markup.dim("Comparing …")
-    columns = [Column(number, each.design, each, 1.0) for number, each in enumerate(run.comparison)]
+    columns = [
+        Column(number, each.design, each, view.unit_for(each.design))
+        for number, each in enumerate(run.comparison)
+    ]
     rows = (
         _comparison_row(run.problem, name, columns)
         for name in run.comparison[1].values
@@ -215,7 +225,8 @@ def _comparison_row(problem: problems.Problem, name: str, columns: Sequence[Colu
     if after is not None:
         pairs = {"least_clearance": after.nearest, "demanded_clearance": after.demanded_nearest}
         if name == "demanded_clearance":
-            label += f", |δ| ≥ {format_number(after.demanded_margin or 0.0, 3)}"
+            unit = columns[-1].unit
+            label += f", |δ| ≥ {unit.text(after.demanded_margin or 0.0, 3)}"
     if legs := pairs.get(name):
         hint += f"; in the new design that of legs {legs[0]} and {legs[1]}"
     look = "ex-strong" if name == GOALS[problem.objective] else ""
@@ -245,21 +256,24 @@ def _look_of_change(
     return "within" if is_better else None
 
 
-def limits_table(design: Design) -> str:
+def limits_table(design: Design, unit: Unit) -> str:
     """Return the limits in force as HTML, a row for those of equal words."""
     hint = "They hold throughout a search; the tab Design changes them."
-    rows = "".join(markup.row(markup.dim(name), text) for name, text in limit_rows(design))
+    rows = "".join(markup.row(markup.dim(name), text) for name, text in limit_rows(design, unit))
     return (
-        f'<div class="ex-after" title="{hint}">{markup.caption("Limits in force, in design units")}'
+        f'<div class="ex-after" title="{hint}">{markup.caption(f"Limits in force ({unit.name})")}'
         f'<table class="ex-limits">{rows}</table></div>'
     )
 
 
-def limit_rows(design: Design) -> Iterator[tuple[str, str]]:
+def limit_rows(design: Design, unit: Unit) -> Iterator[tuple[str, str]]:
     """Yield the symbols and the words of the limits that are in force."""
     for symbols, demand in limits_in_force(design):
-        yield symbols, demand.words()
+        yield symbols, demand.words(unit.factor)
     radii = design.limits.leg_radii
     if any(radii):
         ends = sorted({min(radii), max(radii)})
-        yield "leg radii", " to ".join(format_number(end, LIMIT_DIGITS) for end in ends)
+        yield (
+            "leg radii",
+            " to ".join(format_number(unit.factor * end, LIMIT_DIGITS) for end in ends),
+        )

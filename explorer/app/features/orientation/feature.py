@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Annotated
 
 import msgspec
@@ -30,7 +31,7 @@ from explorer.app.widgets.under_way import UnderWay, look_of, problem
 from explorer.measures.box import corners_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.numerics.number_text import format_decimals, format_number
+from explorer.numerics.number_text import Unit, format_decimals
 from explorer.singularity.colours import Rgb
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,
@@ -144,7 +145,8 @@ class OrientationPanel:
         title, button = "The tilts could not be computed", "Compute the tilts"
         scale = html_of(self._tilts, maps.scale_of_tilts, title, button)
         yield from show_html(self._scale, box(scale) if view.tilts else "")
-        volume = html_of(self._ranges, range_words, "The solid could not be made")
+        words = partial(range_words, unit=frame.state.unit)
+        volume = html_of(self._ranges, words, "The solid could not be made")
         yield from show_html(self._volume, box(volume) if view.over != "none" else "")
 
 
@@ -220,13 +222,14 @@ def best_words(best: GreatestTilt, tilt: float) -> str:
     return f"{_degrees(best.tilt)} at {_degrees(best.torsion)}"
 
 
-def range_words(drawing: work.RangeDrawing) -> str:
-    """Return the volume over a range of tilts, as HTML."""
+def range_words(drawing: work.RangeDrawing, unit: Unit) -> str:
+    """Return the volume over a range of tilts in a unit of lengths, as HTML."""
     solid, design = drawing.solid, drawing.request.design
     if solid.is_empty:
         return alert("This workspace is empty", f"Emptied by: {', '.join(solid.empty_because)}.")
     bound, hint = BOUNDS[drawing.request.over]
-    text = f"{bound} {format_number(solid.volume, 5, size=design.reach**3)} units³"
+    size = design.reach**3
+    text = f"{bound} {unit.raised(3, size).text(solid.volume, 5, size=size)}"
     name = dim(f"{drawing.request.over.capitalize()} workspace")
     return table((row(name, text, hint=f"{VOLUME_HINT} {hint}"),))
 

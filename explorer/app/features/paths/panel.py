@@ -117,8 +117,8 @@ class PathsPanel:
                 disabled=lambda state: state.journey is None,
             )
             self._incidences = (
-                plots.IncidencePlot(gui, plots.MARGINS, has_times=False),
-                plots.IncidencePlot(gui, plots.FOLDS),
+                plots.IncidencePlot(gui, plots.margins_in, has_times=False),
+                plots.IncidencePlot(gui, lambda _: plots.FOLDS),
             )
             self._loads = plots.LoadPlot(services)
         services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
@@ -175,10 +175,10 @@ class PathsPanel:
             ),
         )
         numbers = gui.add_html("")
-        place = "Coordinates of b4 or of the tool point in the base frame, in design units."
+        place = "Coordinates of b4 or of the tool point in the base frame."
         turn = "Yaw, pitch and roll of the platform, in degrees."
         for index, words, hint, step in (
-            (0, "x, y, z", place, 0.01),
+            (0, "x, y, z ({unit})", place, 0.01),
             (1, "angles (°)", turn, 0.1),
         ):
             self._controls.triple(
@@ -189,6 +189,7 @@ class PathsPanel:
                     lambda state, triple, index=index: _set_typed(state, end, index, triple),
                 ),
                 step=step,
+                power=1 - index,
                 visible=lambda state: _is_typed(state, end),
             )
         return numbers
@@ -207,10 +208,10 @@ def end_numbers(state: State, end: EndName) -> str:
     except InputError as error:
         return f'<div class="ex-note ex-close">{escape(markup.sentence(str(error)))}</div>'
     there = position_of(state.design, pose, state.view.at)
-    position = ", ".join(format_decimals(coordinate, 2) for coordinate in there)
+    position = ", ".join(format_number(state.unit.factor * each) for each in there)
     angles = ", ".join(f"{format_decimals(angle, 1)}°" for angle in angles_of(pose))
-    hint = f"x, y, z of {state.point} in design units; yaw, pitch, roll"
-    return markup.note(f'<span title="{hint}">{position} · {angles}</span>')
+    hint = f"x, y, z of {state.point}; yaw, pitch, roll"
+    return markup.note(f'<span title="{hint}">{position} {state.unit.name} · {angles}</span>')
 
 
 def kind_note(state: State) -> str:
@@ -269,7 +270,7 @@ def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") 
     return markup.box(
         f'<div class="ex-line">{play}<span class="ex-cut ex-fill" title="{title}">{title}</span>'
         f"{export}{clear}</div>",
-        plots.crossing_words(journey),
+        plots.crossing_words(journey, state.unit),
         "" if loads is None else plots.load_words(loads),
     )
 

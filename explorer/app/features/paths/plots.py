@@ -35,7 +35,7 @@ from explorer.mechanism.folds import to_folds
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_decimals, format_number
+from explorer.numerics.number_text import UNITS, Unit, format_decimals, format_number
 from explorer.paths.loads import DemandedLoad, PathLoads
 from explorer.singularity.colours import MARGIN_COLOURS
 from explorer.statics.reactions import PART_NAMES, has_limits
@@ -174,9 +174,16 @@ def fold_magnitudes(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     return np.degrees(np.abs(to_folds(position, rotation)[..., 3:]))
 
 
-MARGINS = Quantity(
-    "δ{}", axis("δ (units)", label_size=18, size=40, space=18), (0.0,), 2, "", margins
-)
+def margins_in(unit: Unit) -> Quantity:
+    """Return the margins in a unit of lengths."""
+
+    def values(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+        return unit.factor * margins(position, rotation)
+
+    vertical = axis("margin δ", label_size=18, size=40, space=18)
+    return Quantity("δ{}", vertical, (0.0,), 2, f" {unit.name}", values)
+
+
 FOLDS = Quantity(
     "|φ{}|",
     axis("fold |φ| (°)", label_size=18, size=40) | {"splits": (0.0, 90.0, 180.0)},
@@ -190,8 +197,15 @@ FOLDS = Quantity(
 class IncidencePlot:
     """The chart of a quantity and its legend, empty while there is no path."""
 
-    def __init__(self, gui: viser.GuiApi, quantity: Quantity, *, has_times: bool = True) -> None:
-        self._quantity = quantity
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        quantity_in: Callable[[Unit], Quantity],
+        *,
+        has_times: bool = True,
+    ) -> None:
+        self._quantity_in = quantity_in
+        quantity = quantity_in(UNITS)
         self._legend = gui.add_html("", visible=False)
         lines = (
             line(quantity.name.format(index), colour, dash=dash)
@@ -207,7 +221,7 @@ class IncidencePlot:
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart and its legend show the frame."""
-        journey, quantity = frame.state.journey, self._quantity
+        journey, quantity = frame.state.journey, self._quantity_in(frame.state.unit)
         yield from self._chart.show(incidence_columns(journey, quantity), is_visible=True)
         words = "" if journey is None else legend(journey.pose, quantity)
         yield from show_html(self._legend, words)
@@ -262,8 +276,8 @@ def legend(pose: Pose, quantity: Quantity) -> str:
     return f'<div class="ex-note ex-thirds">{"".join(parts)}</div>'
 
 
-def crossing_words(journey: Journey) -> str:
-    """Return where the path is singular, in one line of HTML."""
+def crossing_words(journey: Journey, unit: Unit) -> str:
+    """Return where the path is singular, in one line of HTML, with a unit of lengths."""
     along_path = journey.margins
     places = [
         f"δ{c.incidence} = 0 at {format_decimals(crossing_time(journey, i), 2)} s"
@@ -275,7 +289,7 @@ def crossing_words(journey: Journey) -> str:
         index = int(np.argmin(along_path.least))
         return (
             f'<div class="ex-within" title="{MARGIN_KINDS}">No singular pose; '
-            f"least |δ{index + 1}| = {format_number(along_path.least[index], 3)} units</div>"
+            f"least |δ{index + 1}| = {unit.text(float(along_path.least[index]), 3)}</div>"
         )
     more = len(places) - MOST_LISTED
     listed = "; ".join(places[:MOST_LISTED]) + (f"; and {more} more" if more > 0 else "")

@@ -78,12 +78,13 @@ class SingularityPanel:
                 "view.singular.ball",
             )
             controls.number(
-                "Warn below",
-                "Warning length of all margins in design units, to which those of distances, turns "
+                "Warn below ({unit})",
+                "Warning length of all margins, to which those of motions, turns "
                 "and 1/cond J are proportional: what is below is orange.",
                 At("view.warn_below", default=lambda state: state.warn_below),
                 least=0.0,
                 step=lambda state: length_span(state).step,
+                power=1,
             )
 
     def updates(self, frame: Frame) -> Updates:
@@ -97,9 +98,9 @@ class SingularityPanel:
 
 def summary(frame: Frame, corner: str = "") -> str:
     """Return the verdict, its reason and the freedoms as HTML, with a button in the corner."""
-    verdict, unit_mm = frame.verdict, frame.state.design.unit_mm
+    verdict, unit = frame.verdict, frame.state.unit
     look, hint = blocks.LOOKS[verdict.kind], blocks.VERDICT_HINT
-    answer = Statement(verdict.title, verdict.reason(unit_mm), look, hint=hint)
+    answer = Statement(verdict.title, verdict.reason(unit), look, hint=hint)
     shows = {f"show {number}": scene.show_button(number) for number in (1, 2, 3)}
     return render([answer, *blocks.freedoms(frame.snapshot)], shows, corner=corner)
 
@@ -109,26 +110,26 @@ def measures_table(frame: Frame) -> str:
     edge = 100.0 / colours.FAR_WARNINGS
     ends = (colours.SINGULAR, 0), (colours.WARNED, edge), (colours.CLEAR, edge), (colours.FAR, 100)
     stops = ",".join(f"{colours.css(colour)} {place:g}%" for colour, place in ends)
-    design = frame.state.design
-    hint = blocks.colour_words(warnings(design.reach, frame.state.warn_below), design.unit_mm)
+    state = frame.state
+    hint = blocks.colour_words(warnings(state.design.reach, state.warn_below), state.unit)
     most = f"≥ {colours.FAR_WARNINGS:g} times"
     legend = (
         f'<div title="{escape(hint)}"><div class="ex-legend" style="--colours:{stops}"></div>'
         f"{ticks((0.0, '0'), (edge, 'warned below'), (100.0, most))}</div>"
     )
-    return box(legend) + render([blocks.conditioning(frame.snapshot)])
+    return box(legend) + render([blocks.conditioning(frame.snapshot, frame.state.unit)])
 
 
 def performance_table(frame: Frame) -> str:
     """Return the gains and the radius of the ball in this pose as HTML."""
     point = frame.state.point
-    radius = blocks.free_ball(frame.snapshot, frame.free_ball, point)
+    radius = blocks.free_ball(frame.snapshot, frame.free_ball, point, frame.state.unit)
     return render([blocks.gains(frame.performance, point), Facts("", (radius,))])
 
 
 def distance_table(frame: Frame) -> str:
     """Return the margins with their nearest singular poses as HTML, the nearest one in bold."""
-    columns = blocks.margin_table(frame.snapshot).columns
+    columns = blocks.margin_table(frame.snapshot, frame.state.unit).columns
     numbers = [each for each in columns if isinstance(each, Column) and not each.wide]
     named = [(head_of(each), each.hint) for each in numbers]
     heads = [("fold", FOLD_HINT), ("", ""), *named, ("", "")]
@@ -190,11 +191,11 @@ def fold_dial(frame: Frame, index: int) -> str:
 
 
 def distance_figure(frame: Frame) -> str:
-    """Return the distance to the nearest singular pose, and which margin is zero there."""
-    verdict, unit_mm = frame.verdict, frame.state.design.unit_mm
-    hint, look = f"{verdict.title}: {verdict.reason(unit_mm)}.", f"ex-{blocks.LOOKS[verdict.kind]}"
+    """Return the motion to the nearest singular pose, and which margin is zero there."""
+    verdict, unit = frame.verdict, frame.state.unit
+    hint, look = f"{verdict.title}: {verdict.reason(unit)}.", f"ex-{blocks.LOOKS[verdict.kind]}"
     name = "Nearest singular pose"
-    return figure("Singularity", name, verdict.brief(unit_mm), hint=hint, look=look)
+    return figure("Singularity", name, verdict.brief(unit), hint=hint, look=look)
 
 
 # In pixels, as in the stylesheet: from row to row, and the height of a node.
@@ -262,7 +263,7 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     )
     return box(
         '<div class="ex-dim ex-small">Press one to go to its nearest pose. Dimensions on the left, '
-        "distances in mm.</div>"
+        f"motions in {frame.state.unit.name}.</div>"
         f'<div class="ex-strata" style="--height:{6 * ROW + NODE_HEIGHT + 4}px">'
         f'{_edges(here)}<div class="ex-ranks">{ranks}</div>'
         f'<div class="ex-nodes" role="toolbar" aria-label="Strata">{nodes}</div></div>'
@@ -283,7 +284,7 @@ def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     if rows:
         rest = (
             '<div class="ex-line ex-dim ex-after"><span>With one more incidence</span>'
-            f"<span>mm</span></div>{rows}"
+            f"<span>motion, {frame.state.unit.name}</span></div>{rows}"
         )
     elif not strata.COVERED[here]:
         rest = '<div class="ex-dim ex-after">Both flags coincide: nothing is more singular.</div>'
@@ -299,11 +300,11 @@ _sentence = cache(blocks.stratum_sentence)
 
 
 def _distance(distance: float | None, frame: Frame) -> str:
-    """Return a distance in mm as text."""
+    """Return a motion as text in the unit of the view."""
     if distance is None:
         return "…"
-    design = frame.state.design
-    return format_fitted(distance * design.unit_mm, design.reach * design.unit_mm, 4)
+    state = frame.state
+    return format_fitted(distance * state.unit.factor, state.design.reach * state.unit.factor, 4)
 
 
 def _node(stratum: Stratum, below: str, level: float | None, *, is_here: bool) -> str:

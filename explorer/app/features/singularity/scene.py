@@ -22,7 +22,6 @@ from explorer.measures.blocks.block import Number
 from explorer.measures.blocks.singularity import finite_gain
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import FAR, SINGULAR, Rgb, proximity_colour
 from explorer.singularity.freedoms import FreeTurn
 from explorer.singularity.nearest import NearestSingularity
@@ -87,8 +86,9 @@ class NearestGhost(ScenePart):
         (tips,) = bodies.platform_joints(placed, np.array([pose.position]), pose.rotation[None])
         here = np.array([placed.points[name] for name in placed.platform_points])
         yield self._displacements, "points", np.stack([here, tips], axis=1).astype(np.float32)
-        distance = format_number(nearest.distance, size=placed.frame.state.design.reach)
-        yield self._label, "text", f"δ{nearest.incidence} = 0: {distance} away"
+        state = placed.frame.state
+        motion = state.unit.text(nearest.distance, size=state.design.reach)
+        yield self._label, "text", f"δ{nearest.incidence} = 0: {motion} of motion"
         yield self._label, "position", tuple(tips[0].tolist())
 
 
@@ -155,7 +155,7 @@ class BallScene(ScenePart):
         yield self._ball, "color", colour
         yield self._touch, "position", tuple(touch.tolist())
         yield self._line, "points", np.stack([centre, touch])[None].astype(np.float32)
-        distance = format_number(ball.radius, size=frame.state.design.reach)
+        distance = frame.state.unit.text(ball.radius, size=frame.state.design.reach)
         yield self._label, "text", f"δ{ball.incidence} = 0: {distance} away"
         yield self._label, "position", tuple(touch.tolist())
 

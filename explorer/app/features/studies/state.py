@@ -17,7 +17,7 @@ from explorer.measures.catalogue import CATALOGUE, measures_in, unmet_needs
 from explorer.measures.measure import Case
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import UNITS, format_number
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
 from explorer.sweep import study as sweeps
 from explorer.sweep.machine import MACHINE
@@ -211,7 +211,7 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> sweeps.Study:
 def unit_of(name: str) -> str:
     """Return the unit of a variable or measure as the page writes it; "" for a plain number."""
     if name in CATALOGUE:
-        return CATALOGUE[name].unit_in("units")
+        return CATALOGUE[name].unit_in(UNITS).name
     if name in MACHINE:
         return MACHINE[name].unit
     return "°" if name == YAW else "units" if name in sweeps.NAMES else ""

@@ -116,23 +116,25 @@ class WorkspacePanel:
         self._legend = gui.add_html("", visible=False)
         self._cut = gui.add_html("")
         controls.slider(
-            "Cut at",
-            "Position of the cutting plane on its axis, in design units.",
+            "Cut at ({unit})",
+            "Position of the cutting plane on its axis.",
             Bound(
                 lambda frame: self._level(frame.state),
                 lambda _, value: Set("view.workspace.level", value, "Cut at"),
             ),
             self._cut_span,
+            power=1,
             disabled=lambda state: state.view.workspace.cut is None,
         )
         self._map = gui.add_html("", visible=False)
         with gui.add_folder("Details", expand_by_default=False):
             self._details = gui.add_html("")
             controls.slider(
-                "Mesh tolerance",
-                "Largest distance of a facet from the true surface, in design units.",
+                "Mesh tolerance ({unit})",
+                "Largest distance of a facet from the true surface.",
                 At("view.workspace.tolerance", default=feeds.tolerance_of),
                 _tolerance_span,
+                power=1,
             )
         services.do_on_press("workspace.go", _go_to)
         buttons.on("workspace.read", self._read)
@@ -154,7 +156,7 @@ class WorkspacePanel:
             measure = work.map_measure(state.design, colour, holds=view.region == "held")
             warn = warnings(state.design.reach, state.warn_below)
             warn_below = warn.condition if measure == "condition" else warn.margin
-            words += texts.legend(measure, warn_below, drawing)
+            words += texts.legend(measure, warn_below, drawing, state.unit)
         if colour in LOAD_MEASURES and view.region != "held":
             any_direction = colour != "deflection"
             words += note(f"{texts.load_words(state, any_direction=any_direction)}.")
@@ -163,7 +165,7 @@ class WorkspacePanel:
         picture = ""
         if mapped is not None:
             mapped = mapped.shift(state.offset(mapped.colouring.rotation))
-            picture = box(map_picture(mapped, state.position, state.design.reach))
+            picture = box(map_picture(mapped, state.position, state.design.reach, state.unit))
         self._mapped = mapped
         yield from show_html(self._map, picture)
         yield self._details, "content", texts.workspace_details(frame, self._feed)
@@ -210,7 +212,8 @@ class WorkspacePanel:
         position: Triple | None = decode_text(text, _POSITION)
         mapped = self._mapped
         if position is not None and mapped is not None:
-            run_script_in(client, call_script("map", text, mapped.words_at(position)))
+            words = mapped.words_at(position, self._session.state.unit)
+            run_script_in(client, call_script("map", text, words))
 
 
 def _go_to(text: str) -> Change | None:
@@ -295,7 +298,7 @@ def volume_figure(services: Services) -> Callable[[Frame], str]:
             name += feeds.orientation_suffix(drawing.request.design, drawing.request.rotation)
             if drawing.measured.volume <= 0.0:
                 hint += f" It is emptied by: {', '.join(drawing.measured.empty_because)}."
-        text, look = texts.volume_text(drawing), look_of(feed)
+        text, look = texts.volume_text(drawing, frame.state.unit), look_of(feed)
         return figure("Workspace", name, text, hint=hint, look=look)
 
     return figure_of

@@ -17,7 +17,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Updates
 from explorer.measures.box import corners_of
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, Rgb, band_colours, proximity_colour
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.faces.surfaces import Surfaces
@@ -119,7 +118,11 @@ class WorkspaceScene(ScenePart):
         if broken is not None:
             name, slack, ends = broken
             yield self._broken, "points", (placed.scale * ends)[None].astype(np.float32)
-            yield self._broken_label, "text", f"{name}: {format_number(-slack, 3)} beyond"
+            yield (
+                self._broken_label,
+                "text",
+                f"{name}: {placed.frame.state.unit.text(-slack, 3)} beyond",
+            )
             yield self._broken_label, "position", tuple((placed.scale * ends[1]).tolist())
 
 

@@ -21,7 +21,7 @@ from explorer.export.drawings.markup import as_html, coordinate, element
 from explorer.export.drawings.slices import Slices, cross, in_plane, map_transform, ruler
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.numerics.number_text import decimals_for, format_decimals, format_number
+from explorer.numerics.number_text import Unit, decimals_for, format_decimals, format_number
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.carried_region import part_names
 from explorer.workspace.position_bands import MEASURE_WORDS, measure_positions
@@ -78,12 +78,12 @@ class SliceMap:
         lows, highs = (u0 + du, v0 + dv), (u1 + du, v1 + dv)
         return replace(self, level=self.level + dw, lows=lows, highs=highs, offset=offset)
 
-    def words_at(self, point: Triple) -> str:
-        """Return the coordinates of a position on the map and the measure there."""
-        design, measure = self.colouring.design, self.colouring.banded
-        decimals = decimals_for(design.reach, DIGITS)
+    def words_at(self, point: Triple, unit: Unit) -> str:
+        """Return the coordinates of a position on the map and the measure there, in a unit."""
+        design, measure, f = self.colouring.design, self.colouring.banded, unit.factor
+        decimals = decimals_for(f * design.reach, DIGITS)
         at = ", ".join(
-            f"{AXES[k]} {format_decimals(point[k], decimals)}" for k in in_plane(self.axis)
+            f"{AXES[k]} {format_decimals(f * point[k], decimals)}" for k in in_plane(self.axis)
         )
         positions = (np.array(point) - self.offset)[None]
         values, found = measure_positions(
@@ -92,16 +92,16 @@ class SliceMap:
         value, index = float(values[0]), int(found[0])
         match measure:
             case "margin":
-                words = f"min |δ| {format_decimals(value, decimals)} (δ{index + 1})"
+                words = f"min |δ| {format_decimals(f * value, decimals)} (δ{index + 1})"
             case "condition":
                 words = f"1 / cond J {format_decimals(value, CONDITION_DECIMALS)}"
             case _:
-                name, unit, factor = MEASURE_WORDS[measure]
-                words = f"{name} {format_number(factor * value, 3, infinite='∞')} {unit}"
+                name, symbol, factor = MEASURE_WORDS[measure]
+                words = f"{name} {format_number(factor * value, 3, infinite='∞')} {symbol}"
                 parts = {"share": part_names(design), "force": PART_NAMES, "bending": PART_NAMES}
                 if measure in parts and 0.0 < value < math.inf:
                     words += f" ({parts[measure][index]})"
-        return f"{at} units: {words}"
+        return f"{at} {unit.name}: {words}"
 
 
 def level_within(low: float, high: float, level: float | None) -> float:
@@ -176,9 +176,9 @@ def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:
     return loops
 
 
-def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
+def map_picture(mapped: SliceMap, position: Triple, reach: float, unit: Unit) -> str:
     """Return the map between its axes as SVG, with the present position of its point as a cross."""
-    (u0, v0), (u1, v1) = mapped.lows, mapped.highs
+    (u0, v0), (u1, v1), f = mapped.lows, mapped.highs, unit.factor
     first, second = in_plane(mapped.axis)
     scale = min((WIDTH - LEFT - RIGHT) / (u1 - u0), (MOST_HEIGHT - TOP - BOTTOM) / (v1 - v0))
     height = TOP + BOTTOM + scale * (v1 - v0)
@@ -193,8 +193,15 @@ def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
             element("g", *cross(left + scale * (u - u0), bottom - scale * (v - v0)), class_=look)
         )
     pieces += [
-        ruler(f"{AXES[first]} (units)", (u0, u1), left, scale, across=bottom, up=False),
-        ruler(AXES[second], (v0, v1), bottom, scale, across=left, up=True),
+        ruler(
+            f"{AXES[first]} ({unit.name})",
+            (f * u0, f * u1),
+            left,
+            scale / f,
+            across=bottom,
+            up=False,
+        ),
+        ruler(AXES[second], (f * v0, f * v1), bottom, scale / f, across=left, up=True),
     ]
     facts = {
         "axis": AXES.index(mapped.axis),
@@ -210,7 +217,7 @@ def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
     wide, high = scale * (u1 - u0), scale * (v1 - v0)
     frame = element("rect", x=left, y=bottom - high, width=wide, height=high, class_="frame")
     size = map_transform(scale / mapped.own_scale, left, bottom)
-    words = f"Map of the slice at {mapped.axis} = {format_number(mapped.level, 4)}"
+    words = f"Map of the slice at {mapped.axis} = {unit.text(mapped.level)}"
     return (
         f'<svg class="ex-map" viewBox="0 0 {coordinate(WIDTH)} {coordinate(height)}" role="img" '
         f'aria-label="{words}" data-map="{escape(msgspec.json.encode(facts).decode())}">'

@@ -19,7 +19,7 @@ from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACI
 from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import UNITS, Unit, format_number
 from explorer.singularity.colours import BAND_EDGES, band_colours, css
 from explorer.statics.reactions import has_limits
 from explorer.workspace.position_bands import MEASURE_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
@@ -36,17 +36,14 @@ def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume
         if measured.volume <= 0.0:
             causes = ", ".join(measured.empty_because)
             return markup.alert("The workspace is empty", f"Emptied by: {causes}.")
-        litres, size = (0.01 * design.unit_mm) ** 3, design.reach**3
-        cubic_cm, text = (
-            format_number(factor * measured.volume, 4, size=factor * size)
-            for factor in (1e3 * litres, litres)
-        )
+        unit = frame.state.unit
+        other = UNITS if unit.name == "mm" else design.millimetres
         where = f"within the limits, in the {orientation_word(frame)} orientation"
         of_tool = ", of the tool" if frame.state.view.at == "tool" else ""
-        error = markup.dim(f"± {format_number(measured.error, 1)}")
+        hint = f"Exact but for ± {format_number(measured.error, 1)} units³"
         return (
-            f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>{error}</div>'
-            + markup.caption(f"{cubic_cm} cm³ ({text} l) {where}{of_tool}")
+            f'<div class="ex-large" title="{hint}">{volume_text(newest, unit)}</div>'
+            + markup.caption(f"{volume_text(newest, other)} {where}{of_tool}")
             + (_paper_words() if design == PRESETS["paper-optimal"] else "")
         )
 
@@ -80,7 +77,7 @@ def drawing_words(frame: Frame, feed: Feed[work.WorkspaceRequest, work.Workspace
     is_accessible = region == "accessible"
     does, rest = ("accessible", COLLIDING) if is_accessible else ("hold the load", AT_LIMIT)
     words = (
-        f'<div class="ex-line"><span>{format_number(part.volume, 6)} units³ {does}, '
+        f'<div class="ex-line"><span>{frame.state.unit_of(3).text(part.volume, 6)} {does}, '
         f"{format_number(percent, 4)} %</span>{markup.dim(waiting)}</div>"
         f"{markup.meter(percent, PLAIN, rest)}"
     )
@@ -122,14 +119,14 @@ def load_words(state: State, *, any_direction: bool = True) -> str:
     return words
 
 
-def volume_text(drawing: work.MeasuredVolume | None) -> str:
-    """Return a volume with its unit, "empty", or "–" before the first one."""
+def volume_text(drawing: work.MeasuredVolume | None, unit: Unit) -> str:
+    """Return a volume in a unit of lengths, "empty", or "–" before the first one."""
     if drawing is None:
         return "–"
     if drawing.measured.volume <= 0.0:
         return "empty"
     size = drawing.request.design.reach**3
-    return f"{format_number(drawing.measured.volume, 6, size=size)} units³"
+    return unit.raised(3, size).text(drawing.measured.volume, size=size)
 
 
 def workspace_details(
@@ -145,7 +142,7 @@ def workspace_details(
         parts.append(markup.alert("The solid is not quite the workspace", why))
     parts.append(_numbers(drawing, frame.state))
     if part is not None and part.pairs and drawing.volume > 0.0:
-        clearances = workspace_clearances(part.pairs, drawing.request.design)
+        clearances = workspace_clearances(part.pairs, drawing.request.design, frame.state.unit)
         parts += [content_of(block, {}) for block in clearances]
         is_coloured = frame.state.view.workspace.colour == "plain"
         if is_coloured and any(pair.blocked_volume > 0.0 for pair in part.pairs):
@@ -156,6 +153,7 @@ def workspace_details(
 def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
     """Return the table of nodes, extent and volumes."""
     nodes, part, request = drawing.nodes, drawing.part, drawing.request
+    unit, cubic = state.unit, state.unit_of(3)
     suffix = orientation_suffix(request.design, request.rotation)
     rows: list[str] = []
 
@@ -174,28 +172,32 @@ def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
         elif part is not None and part.pairs:
             hint += "; too many to check each step between them"
         add(f"{which}s", count, hint)
-        add(f"{which} volume", format_number(volume, 6), volume_hint)
-        add("Node step", format_number(nodes.step, 4), "Step of the grid, in design units")
+        add(f"{which} volume", cubic.text(volume, 6), volume_hint)
+        add("Node step", unit.text(nodes.step), "Step of the grid")
     if drawing.extent is not None:
         size = request.design.reach
         ends = np.array(drawing.extent) + state.offset(request.rotation)
         name = "Extent" if state.view.at == "b4" else "Extent of the tool"
         for axis, low, high in zip("xyz", *ends.tolist(), strict=True):
-            text = f"{format_number(low, size=size)} … {format_number(high, size=size)}"
-            add(f"{name} {axis}", text, "Extent of the workspace, in design units")
+            places = (unit.factor * low, unit.factor * high)
+            texts = (format_number(end, size=unit.factor * size) for end in places)
+            text = f"{' … '.join(texts)} {unit.name}"
+            add(f"{name} {axis}", text, "Extent of the workspace")
     if drawing.hull_volume is not None:
-        add("Hull volume", format_number(drawing.hull_volume, 6), "Volume of the convex hull")
+        add("Hull volume", cubic.text(drawing.hull_volume, 6), "Volume of the convex hull")
     return markup.table(rows)
 
 
-def legend(measure: Measure, warn_below: float, drawing: work.WorkspaceDrawing | None) -> str:
+def legend(
+    measure: Measure, warn_below: float, drawing: work.WorkspaceDrawing | None, unit: Unit
+) -> str:
     """Return the bands of colours with the values at their edges, and the colours of the map.
 
     Margins and conditions raise a warning below a value; other levels are those of the drawing.
     """
     if measure in MEASURE_WORDS:
-        words, unit, factor = MEASURE_WORDS[measure]
-        name = f"{words.capitalize()} ({unit})"
+        words, symbol, factor = MEASURE_WORDS[measure]
+        name = f"{words.capitalize()} ({symbol})"
         colours = SHARE_COLOURS if measure == "share" else STEP_COLOURS
         levels: tuple[float, ...] = SHARES if measure == "share" else ()
         if measure != "share" and drawing is not None and drawing.request.colour == measure:
@@ -204,10 +206,13 @@ def legend(measure: Measure, warn_below: float, drawing: work.WorkspaceDrawing |
         # The ends of bands, and the infinity of singular planes.
         marked = dict(enumerate(texts))
     else:
-        name = "1 / cond J" if measure == "condition" else "Smallest |δ| (units)"
+        name, factor = "1 / cond J", 1.0
+        if measure == "margin":
+            name, factor = f"Smallest |δ| ({unit.name})", unit.factor
         colours = band_colours()
         # All bands are drawn equally wide, so the values at their edges are not evenly spaced.
-        marked = {k: format_number(BAND_EDGES[k] * warn_below, 2) for k in (0, 2, 4, 6, 9)}
+        warn = factor * warn_below
+        marked = {k: format_number(BAND_EDGES[k] * warn, 2) for k in (0, 2, 4, 6, 9)}
     width = 100.0 / len(colours)
     stops = ",".join(f"{css(band)} 0 {width * k:g}%" for k, band in enumerate(colours, 1))
     edges = [(100.0 * k / len(colours), text) for k, text in marked.items()]
