@@ -52,8 +52,11 @@ class Unit(NamedTuple):
 
     def text(self, value: float, digits: int = 4, *, size: float = 0.0) -> str:
         """Return a value for people, given in design units as its size is."""
-        words = format_number(value * self.factor, digits, size=size * self.factor)
-        return f"{words} {self.name}"
+        return f"{self.number(value, digits, size=size)} {self.name}"
+
+    def number(self, value: float, digits: int = 4, *, size: float = 0.0) -> str:
+        """Return the number of `text` alone."""
+        return format_number(value * self.factor, digits, size=size * self.factor)
 
     def raised(self, power: int, size: float = 0.0) -> Unit:
         """Return the unit of areas or volumes; of large volumes beside mm that is cm³.

@@ -19,7 +19,7 @@ from explorer.mechanism.design import LENGTHS, Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import SINGULAR, planes_of_singularity
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import UNITS, Unit
 from explorer.optimise import problem as problems
 from explorer.workspace.limits.table import GAP
 
@@ -43,9 +43,12 @@ class Conflict(NamedTuple):
     message: str
 
 
-def find_conflicts(problem: problems.Problem) -> tuple[Conflict, ...]:
-    """Return the reasons why no design within the bounds meets the demands, one for each limit."""
-    intervals, found = Intervals(problem), dict[str, Conflict]()
+def find_conflicts(problem: problems.Problem, unit: Unit = UNITS) -> tuple[Conflict, ...]:
+    """Return the reasons why no design within the bounds meets the demands, one for each limit.
+
+    Their words have lengths in the unit.
+    """
+    intervals, found = Intervals(problem, unit), dict[str, Conflict]()
     for find in (_of_volume, _of_lengths, _of_required_box, _of_margins):
         for conflict in find(intervals):
             found.setdefault(conflict.limit, conflict)
@@ -76,8 +79,8 @@ def without_limit(design: Design, limit: str) -> Design | None:
 class Intervals:
     """Intervals that hold every value of a quantity within the bounds, and may be wider."""
 
-    def __init__(self, problem: problems.Problem) -> None:
-        self.problem = problem
+    def __init__(self, problem: problems.Problem, unit: Unit = UNITS) -> None:
+        self.problem, self.unit = problem, unit
         self.rotation = problem.start.home_pose.rotation
         self._bounds = {each.name: (each.low, each.high) for each in problem.variables}
         self.is_turning = len({*self._bounds.get(problems.YAW, ())}) > 1
@@ -157,35 +160,38 @@ def volume_bounds(intervals: Intervals) -> Iterator[tuple[str, str, float]]:
         limit, _, radius = intervals.maximum(name)
         is_halved = margin is not None and height >= -ROUNDING * radius
         areas.append((0.5 if is_halved else 1.0) * math.pi * radius**2)
-        words = f"the {limit} of {format_number(radius, 6)} units leaves room for"
+        words = f"the {limit} of {intervals.unit.text(radius, 6)} leaves room for"
         yield limit, words, 4.0 / 3.0 * radius * areas[-1]
     if guide is not None:
-        low, high = (format_number(end, 6) for end in guide)
+        low, high = intervals.unit.number(guide[0], 6), intervals.unit.text(guide[1], 6)
         free = max(0.0, guide[1] - guide[0] - float(_smallest(intervals.apart)))
-        yield "guide", f"a guide from {low} to {high} units leaves room for", free * min(areas)
+        yield "guide", f"a guide from {low} to {high} leaves room for", free * min(areas)
 
 
 def _of_volume(intervals: Intervals) -> Iterator[Conflict]:
     wanted = intervals.problem.demands.volume or 0.0
+    unit = intervals.unit.raised(3, wanted)
     for limit, words, most in volume_bounds(intervals):
         if most < wanted * (1.0 - SPARE):
             # As many digits as let them differ.
             digits = 4 if most < 0.999 * wanted else 8
-            room, demanded = (format_number(volume, digits) for volume in (most, wanted))
-            yield Conflict(limit, f"{words} at most {room} of the {demanded} units³ asked for")
+            room, demanded = unit.number(most, digits), unit.text(wanted, digits)
+            yield Conflict(limit, f"{words} at most {room} of the {demanded} asked for")
 
 
 def _of_lengths(intervals: Intervals) -> Iterator[Conflict]:
     gap, demanded = intervals.problem.start.limits.gap, intervals.problem.demands.reach
+    unit = intervals.unit
     longest = max(intervals.maximum(name)[1] for name in LENGTHS)
     if demanded is not None and longest > demanded * (1.0 + SPARE):
-        least, most = (format_number(length, 6) for length in (longest, demanded))
-        words = f"the longest leg is at least {least} units, and {most} units are asked for"
-        yield Conflict(LONGEST_LEG, words)
+        least, most = (unit.text(length, 6) for length in (longest, demanded))
+        yield Conflict(
+            LONGEST_LEG, f"the longest leg is at least {least}, and {most} are asked for"
+        )
     apart = float(np.abs(intervals.apart).max())
     if apart < gap * (1.0 - SPARE):
-        most, least = format_number(apart), format_number(gap, 6)
-        words = f"the carriages are at most {most} units apart, and the gap is to be {least} units"
+        most, least = unit.text(apart), unit.text(gap, 6)
+        words = f"the carriages are at most {most} apart, and the gap is to be {least}"
         yield Conflict(GAP, words)
 
 
@@ -193,20 +199,20 @@ def _of_required_box(intervals: Intervals) -> Iterator[Conflict]:
     box, required = intervals.problem.start.limits.box, intervals.problem.demands.required_box
     if required is None:
         return
-    shifts = intervals.of(*problems.SHIFTS)
+    shifts, unit = intervals.of(*problems.SHIFTS), intervals.unit
     for axis, name in enumerate("xyz" if box is not None else ""):
         (low, high), (least, most) = ends = np.array([required, box])[:, :, axis].tolist()
         # It may be shifted by what lies in both intervals, if anything does.
         back, on = max(least - low, shifts[axis, 0]), min(most - high, shifts[axis, 1])
         if back > on + SPARE * max(most - least, high - low):
-            own, other = (f"{format_number(a, 6)} to {format_number(b, 6)} units" for a, b in ends)
+            own, other = (f"{unit.number(a, 6)} to {unit.text(b, 6)}" for a, b in ends)
             words = f"along {name} the required box from {own} lies beyond the box from {other}"
             yield Conflict(BOX_LIMIT, words)
     for name, needed in needed_lengths(intervals, required).items():
         limit, _, most = intervals.maximum(name)
         if needed > most * (1.0 + SPARE):
-            words = f"the required box needs {name} up to {format_number(needed)} units"
-            yield Conflict(limit, f"{words}, and the {limit} is {format_number(most, 6)} units")
+            words = f"the required box needs {name} up to {unit.text(needed)}"
+            yield Conflict(limit, f"{words}, and the {limit} is {unit.text(most, 6)}")
 
 
 def _of_margins(intervals: Intervals) -> Iterator[Conflict]:
@@ -227,9 +233,9 @@ def _of_margins(intervals: Intervals) -> Iterator[Conflict]:
             for normal in (signs[index] * planes[index], -signs[index] * planes[index])
         )
         if least is not None and own < least - SPARE * problem.size:
-            most, demanded = format_number(own), format_number(least, 6)
-            words = f"the margin over the required box is at most {most} units, and the limits"
-            yield Conflict("margin", f"{words} demand {demanded} units")
+            most, demanded = intervals.unit.text(own), intervals.unit.text(least, 6)
+            words = f"the margin over the required box is at most {most}, and the limits demand"
+            yield Conflict("margin", f"{words} {demanded}")
         if needs_regular and max(own, other) <= rounding:
             words = f"the required box is on or across the singular plane δ{index + 1} = 0, where"
             yield Conflict("singular plane", f"{words} no load is held and errors are infinite")

@@ -21,6 +21,7 @@ from explorer.app.features.optimise.words import limit_rows
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.state.actions import Open
 from explorer.app.state.frame import Frame
+from explorer.numerics.number_text import UNITS
 from explorer.workspace.limits.constraints import angle_between, constraints
 from explorer.workspace.limits.quantities import ANGLE, Bound, Demand
 from explorer.workspace.limits.table import LIMITS, Entry, Limit, LimitCase, angle_from_home

@@ -216,7 +216,7 @@ class SetPose(Action):
     def describe(self, after: State) -> str:
         """Return where the platform is."""
         unit, size = after.unit, after.design.reach
-        place = (format_number(unit.factor * x, 4, size=unit.factor * size) for x in after.position)
+        place = (unit.number(x, size=size) for x in after.position)
         return f"Move {after.point} to {', '.join(place)} {unit.name}"
 
 

@@ -170,7 +170,7 @@ def stratum_sentence(stratum: Stratum) -> str:
     return f"{zero} = 0: {describe_stratum(stratum)}"
 
 
-def freedoms(snapshot: Snapshot) -> Iterator[block.Statement]:
+def freedoms(snapshot: Snapshot, unit: Unit = UNITS) -> Iterator[block.Statement]:
     """Yield what locked actuators let the platform do; nothing in a pose that is not singular."""
     if not snapshot.is_singular:
         return
@@ -183,12 +183,13 @@ def freedoms(snapshot: Snapshot) -> Iterator[block.Statement]:
     among = ", among them" if len(found.turns) < found.count else ""
     ends = f"{among}:" if found.turns else "."
     yield block.Statement("", f"With all actuators locked the platform {can}{ends}")
-    yield from (_free_turn(snapshot, turn) for turn in found.turns)
+    yield from (_free_turn(snapshot, turn, unit) for turn in found.turns)
 
 
-def _free_turn(snapshot: Snapshot, turn: FreeTurn) -> block.Statement:
-    point = block.Vector(turn.point.tolist(), span=snapshot.design.reach)
-    through: block.Words = ("b4 (", point, ") units") if turn.incidence == 1 else ("a1",)
+def _free_turn(snapshot: Snapshot, turn: FreeTurn, unit: Unit) -> block.Statement:
+    place, span = (unit.factor * turn.point).tolist(), unit.factor * snapshot.design.reach
+    point = block.Vector(place, span=span), f") {unit.name}"
+    through: block.Words = ("b4 (", *point) if turn.incidence == 1 else ("a1",)
     along = block.Vector(turn.direction.tolist(), span=1.0)
     at_all = "; no joint changes at any angle" if turn.is_finite else ""
     return block.Statement(

@@ -25,7 +25,6 @@ from explorer.app.state.actions import Action, GoHome, Set, SetPosition, SetVari
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
-from explorer.numerics.number_text import format_number
 from explorer.optimise.defaults import PAPER_VOLUME
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
@@ -180,8 +179,9 @@ def _result(frame: Frame) -> str:
     if run is None or not run.iterates:
         return ""
     volumes = run.iterates[0].volume, run.iterates[-1].volume, PAPER_VOLUME
-    then, now, wanted = (format_number(each, 4) for each in volumes)
-    return f"The volume grew from {then} to <b>{now} units³</b>; the paper asks for {wanted}."
+    unit = frame.state.unit_of(3)
+    then, now, wanted = map(unit.number, volumes)
+    return f"The volume grew from {then} to <b>{now} {unit.name}</b>; the paper asks for {wanted}."
 
 
 @dataclass

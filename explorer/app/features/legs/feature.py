@@ -229,7 +229,7 @@ def _row(name: str, colour: Rgb, radius: float | None, curve: RadiusCurve, unit:
 
 def _position(position: FloatArray, unit: Unit) -> str:
     rounded = np.round(position, 6) + 0.0
-    texts = ", ".join(format_number(unit.factor * float(x), 3) for x in rounded)
+    texts = ", ".join(unit.number(float(x), 3) for x in rounded)
     return f"({texts}) {unit.name}"
 
 

@@ -70,14 +70,15 @@ class ModesPanel:
 
 def present_mode(frame: Frame) -> str:
     """Return the present mode, and the limits that the pose breaks, as HTML."""
-    broken = (f'<div class="ex-beyond">{escape(str(e))}</div>' for e in frame.snapshot.violations)
-    return box(f"<b>{frame.snapshot.mode_words.capitalize()}</b>", *broken)
+    broken = (each.words(frame.state.unit) for each in frame.snapshot.violations)
+    alerts = (f'<div class="ex-beyond">{escape(words)}</div>' for words in broken)
+    return box(f"<b>{frame.snapshot.mode_words.capitalize()}</b>", *alerts)
 
 
 def modes_table(frame: Frame, switch: str) -> str:
     """Return the table of a frame, with the switch for the ghosts in its head, as HTML."""
     names = "".join(f"<span>{name}</span>" for name in ("", "δ1 δ2 δ3", "x", "y", "z", "limits"))
-    head = f"{frame.state.point} in design units"
+    head = f"{frame.state.point} in {frame.state.unit.name}"
     if frame.state.unclosed is not None:
         head = "These lengths close in no mode; below are those of the last lengths that did."
     return box(

@@ -275,5 +275,5 @@ def limit_rows(design: Design, unit: Unit) -> Iterator[tuple[str, str]]:
         ends = sorted({min(radii), max(radii)})
         yield (
             "leg radii",
-            " to ".join(format_number(unit.factor * end, LIMIT_DIGITS) for end in ends),
+            " to ".join(unit.number(end, LIMIT_DIGITS) for end in ends),
         )

@@ -16,6 +16,7 @@ from explorer.errors import ExplorerError
 from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import Design
 from explorer.numerics import checks
+from explorer.numerics.number_text import Unit
 from explorer.optimise import conflicts, defaults, problem as problems, solver
 from explorer.optimise.outcome import Outcome
 from explorer.workspace.limits.constraints import constraints, slacks
@@ -84,17 +85,19 @@ def _problem(design: Design, request: OptimisationRequest) -> problems.Problem:
 
 def find_refusals(state: State) -> tuple[conflicts.Conflict, ...]:
     """Return why no search can start: demands that the limits rule out, or no problem at all."""
-    return _find_refusals(state.design, complete_request(state))
+    return _find_refusals(state.design, complete_request(state), state.unit)
 
 
 @lru_cache(maxsize=16)
-def _find_refusals(design: Design, request: OptimisationRequest) -> tuple[conflicts.Conflict, ...]:
+def _find_refusals(
+    design: Design, request: OptimisationRequest, unit: Unit
+) -> tuple[conflicts.Conflict, ...]:
     try:
         problem = _problem(design, request)
     except ExplorerError as error:
         limit = error.limit if isinstance(error, problems.StartError) else ""
         return (conflicts.Conflict(limit, str(error)),)
-    return conflicts.find_conflicts(problem)
+    return conflicts.find_conflicts(problem, unit)
 
 
 def liftable_limits(state: State) -> tuple[str, ...]:
@@ -112,7 +115,7 @@ def is_paper_box_on_offer(state: State) -> bool:
     if conflicts.BOX_LIMIT not in liftable_limits(state):
         return False
     boxed = problems.with_box(state.design, conflicts.PAPER_BOX)
-    left = _find_refusals(boxed, complete_request(state))
+    left = _find_refusals(boxed, complete_request(state), state.unit)
     return boxed != state.design and all(each.limit != conflicts.BOX_LIMIT for each in left)
 
 

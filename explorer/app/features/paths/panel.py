@@ -208,7 +208,7 @@ def end_numbers(state: State, end: EndName) -> str:
     except InputError as error:
         return f'<div class="ex-note ex-close">{escape(markup.sentence(str(error)))}</div>'
     there = position_of(state.design, pose, state.view.at)
-    position = ", ".join(format_number(state.unit.factor * each) for each in there)
+    position = ", ".join(map(state.unit.number, there))
     angles = ", ".join(f"{format_decimals(angle, 1)}°" for angle in angles_of(pose))
     hint = f"x, y, z of {state.point}; yaw, pitch, roll"
     return markup.note(f'<span title="{hint}">{position} {state.unit.name} · {angles}</span>')

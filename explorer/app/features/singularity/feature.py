@@ -102,7 +102,7 @@ def summary(frame: Frame, corner: str = "") -> str:
     look, hint = blocks.LOOKS[verdict.kind], blocks.VERDICT_HINT
     answer = Statement(verdict.title, verdict.reason(unit), look, hint=hint)
     shows = {f"show {number}": scene.show_button(number) for number in (1, 2, 3)}
-    return render([answer, *blocks.freedoms(frame.snapshot)], shows, corner=corner)
+    return render([answer, *blocks.freedoms(frame.snapshot, unit)], shows, corner=corner)
 
 
 def measures_table(frame: Frame) -> str:

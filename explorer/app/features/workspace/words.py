@@ -36,11 +36,11 @@ def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume
         if measured.volume <= 0.0:
             causes = ", ".join(measured.empty_because)
             return markup.alert("The workspace is empty", f"Emptied by: {causes}.")
-        unit = frame.state.unit
+        unit, cubic = frame.state.unit, frame.state.unit_of(3)
         other = UNITS if unit.name == "mm" else design.millimetres
         where = f"within the limits, in the {orientation_word(frame)} orientation"
         of_tool = ", of the tool" if frame.state.view.at == "tool" else ""
-        hint = f"Exact but for ± {format_number(measured.error, 1)} units³"
+        hint = f"Exact but for ± {cubic.text(measured.error, 1)}"
         return (
             f'<div class="ex-large" title="{hint}">{volume_text(newest, unit)}</div>'
             + markup.caption(f"{volume_text(newest, other)} {where}{of_tool}")
@@ -179,9 +179,7 @@ def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
         ends = np.array(drawing.extent) + state.offset(request.rotation)
         name = "Extent" if state.view.at == "b4" else "Extent of the tool"
         for axis, low, high in zip("xyz", *ends.tolist(), strict=True):
-            places = (unit.factor * low, unit.factor * high)
-            texts = (format_number(end, size=unit.factor * size) for end in places)
-            text = f"{' … '.join(texts)} {unit.name}"
+            text = f"{unit.number(low, size=size)} … {unit.text(high, size=size)}"
             add(f"{name} {axis}", text, "Extent of the workspace")
     if drawing.hull_volume is not None:
         add("Hull volume", cubic.text(drawing.hull_volume, 6), "Volume of the convex hull")
