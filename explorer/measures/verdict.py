@@ -101,29 +101,28 @@ class Verdict(NamedTuple):
         """Return the reason, such as "2.5 mm of motion to the nearest singular pose, …"."""
         if self.kind == "singular":
             return "; ".join(f"δ{index} = 0: {INCIDENCES[index - 1]}" for index in self.incidences)
-        first = self.incidences[0]
+        first, away = self.incidences[0], self._away(unit)
         if self.cause == "condition":
             return (
                 f"1/cond J is {format_number(self.condition, 2)}, most by δ{first}; δ{first} = 0 "
-                f"is {unit.text(self.distance, 3)} of motion away"
+                f"is {away} away"
             )
-        is_motion = self.cause == "distance"
-        length = unit.text(self.distance, 3)
-        away = f"{length} of motion" if is_motion else f"{self._turn()} of turning"
         return f"{away} to the nearest singular pose, {INCIDENCES[first - 1]} (δ{first} = 0)"
 
     def brief(self, unit: Unit) -> str:
-        """Return the verdict in a few words, such as "10.3 mm to δ1 = 0", "7° to δ2 = 0"."""
+        """Return the verdict in a few words, such as "10.3 mm of motion", "7° of turning"."""
         names = " and ".join(f"δ{index} = 0" for index in self.incidences)
         if self.kind == "singular":
             return f"Singular: {names}"
         if self.cause == "condition":
             return f"1/cond J {format_number(self.condition, 2)}"
-        away = unit.text(self.distance, 3) if self.cause == "distance" else self._turn()
-        return f"{away} to δ{self.incidences[0]} = 0"
+        return self._away(unit)
 
-    def _turn(self) -> str:
-        return f"{format_number(math.degrees(self.turn), 2)}°"
+    def _away(self, unit: Unit) -> str:
+        """Return how far the nearest singular pose is, by the turn where that is the reason."""
+        if self.cause == "turn":
+            return f"{format_number(math.degrees(self.turn), 2)}° of turning"
+        return f"{unit.text(self.distance, 3)} of motion"
 
 
 def warnings(reach: float, warn_below: float | None = None) -> Warnings:

@@ -333,9 +333,9 @@ def test_browser_that_crossed_with_the_explorer_shows_what_its_user_set(
 
         # Told of one value, it sends another before it has shown that.
         page.session.do(SetPosition(0, 11.5))
-        read_until(11.5)
-        client.update(uuid, 12.5)
-        read_until(12.5)
+        read_until(115.0)
+        client.update(uuid, 125.0)
+        read_until(125.0)
         assert page.session.state.position[0] == 12.5
 
 

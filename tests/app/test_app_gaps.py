@@ -168,9 +168,9 @@ def test_gap_fades_in_on_approach_with_margin_and_length_until_the_contact(
             assert (presence, label["visible"]) == (1.0, True)
             told = label["text"].removeprefix(f"δ{incidence} ").removesuffix(" mm").split(" · ")
             snapshot = placed.frame.snapshot
-            assert number(told[0]) == pytest.approx(snapshot.margins[incidence - 1], abs=5e-3)
-            length = snapshot.gaps.lengths[incidence - 1] * OPTIMAL.unit_mm
-            assert number(told[1]) == pytest.approx(length, abs=5e-2)
+            lengths = snapshot.margins[incidence - 1], snapshot.gaps.lengths[incidence - 1]
+            for text, length in zip(told, lengths, strict=True):
+                assert number(text) == pytest.approx(length * OPTIMAL.unit_mm, abs=5e-2)
         else:
             assert 0.0 < presence <= 1.0
     assert draw(gaps, at)[f"/gaps/label/{incidence}"]["text"] == f"δ{incidence} = 0"

@@ -444,7 +444,7 @@ def test_changes_during_a_press_of_a_browser_are_one_step(
 
         def move() -> int:
             value = next(values)
-            tab.update(slider._impl.uuid, value)
+            tab.update(slider._impl.uuid, OPTIMAL.unit_mm * value)
             wait_for(lambda: session.state.pose.position[0] == value)
             assert session.wait_until_idle()
             return len(session.history.steps) - begun

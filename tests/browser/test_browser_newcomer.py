@@ -81,7 +81,7 @@ def test_pose_near_a_singularity_is_named_in_amber_with_its_distance(newcomer: N
     ).inner_text()
     assert 0.0 < numbers(words)[0] < 1.0
     nearest = newcomer.figure("Nearest singular pose")
-    expect(nearest).to_contain_text("mm to δ1 = 0")
+    expect(nearest).to_contain_text("mm of motion")
     assert numbers(nearest.inner_text())[0] == numbers(words)[0]
     assert newcomer.presses_for() == 2
     newcomer.press("Go to δ1 = 0")

@@ -21,6 +21,7 @@ from explorer.legs.moves import pairs_are_clear
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.number_text import Unit
 from explorer.numerics.search import descend
 from explorer.workspace.limits.constraints import Constraint, constraints, satisfies, slacks
 from explorer.workspace.limits.region import box_of, region_of
@@ -178,11 +179,12 @@ class StartError(InputError):
 
     Attributes:
         nearest: Nearest valid position at the same orientation, shape (3,); None without any.
+        in_millimetres: The message with lengths in mm; its own are in design units.
     """
 
-    def __init__(self, message: str, nearest: FloatArray | None) -> None:
+    def __init__(self, message: str, nearest: FloatArray | None, in_millimetres: str) -> None:
         super().__init__(message)
-        self.nearest = nearest
+        self.nearest, self.in_millimetres = nearest, in_millimetres
 
 
 def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> None:
@@ -190,32 +192,46 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
 
     Its message names the limits or the pairs of legs, and the nearest valid position.
     """
-    faults = start_faults(design, rotation, position)
-    if not faults:
+    if not start_faults(design, rotation, position):
         return
-    refusal = f"no position is accessible from {_text_of(position)}: {'; '.join(faults)}"
     nearest = nearest_clear_position(design, rotation, position)
-    remedy = "no valid position is found at this orientation"
-    if nearest is not None:
-        remedy = f"the nearest valid position at this orientation is {_text_of(nearest)}"
-    raise StartError(f"{refusal}; {remedy}", nearest)
+
+    def words(unit: Unit | None) -> str:
+        faults = "; ".join(start_faults(design, rotation, position, unit))
+        remedy = "no valid position is found at this orientation"
+        if nearest is not None:
+            place = _text_of(nearest, unit)
+            remedy = f"the nearest valid position at this orientation is {place}"
+        return f"no position is accessible from {_text_of(position, unit)}: {faults}; {remedy}"
+
+    raise StartError(words(None), nearest, words(design.millimetres))
 
 
-def start_faults(design: Design, rotation: FloatArray, position: FloatArray) -> list[str]:
-    """Return the limits that a position breaks and the pairs of legs that touch there."""
+def start_faults(
+    design: Design, rotation: FloatArray, position: FloatArray, unit: Unit | None = None
+) -> list[str]:
+    """Return the limits that a position breaks and the pairs of legs that touch there.
+
+    Lengths are in design units, without their name, unless a unit is given.
+    """
     configuration = Configuration(design, position, rotation)
     (broken,) = violations(configuration)
     clearance = leg_clearances(configuration).clearance
-    faults = [str(violation) for violation in broken]
+    faults = [violation.words(unit) for violation in broken]
     for (i, j), depth in zip(PAIRS, (-clearance).tolist(), strict=True):
         if depth >= 0.0:
-            manner = f"overlap by {depth:.4g}" if depth > 0.0 else "cross"
+            manner = (
+                f"overlap by {unit.text(depth) if unit else f'{depth:.4g}'}"
+                if depth > 0.0
+                else "cross"
+            )
             faults.append(f"legs {i} and {j} {manner}")
     return faults
 
 
-def _text_of(position: FloatArray) -> str:
-    return "(" + ", ".join(f"{x:.6g}" for x in position) + ")"
+def _text_of(position: FloatArray, unit: Unit | None) -> str:
+    factor, name = (1.0, "") if unit is None else (unit.factor, f" {unit.name}")
+    return "(" + ", ".join(f"{factor * x:.6g}" for x in position) + f"){name}"
 
 
 def count_nodes(

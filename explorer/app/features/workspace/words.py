@@ -19,7 +19,8 @@ from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACI
 from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
-from explorer.numerics.number_text import UNITS, Unit, format_number
+from explorer.numerics.number_text import Unit, format_number
+from explorer.optimise.defaults import PAPER_VOLUME
 from explorer.singularity.colours import BAND_EDGES, band_colours, css
 from explorer.statics.reactions import has_limits
 from explorer.workspace.position_bands import MEASURE_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
@@ -36,24 +37,24 @@ def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume
         if measured.volume <= 0.0:
             causes = ", ".join(measured.empty_because)
             return markup.alert("The workspace is empty", f"Emptied by: {causes}.")
-        unit, cubic = frame.state.unit, frame.state.unit_of(3)
-        other = UNITS if unit.name == "mm" else design.millimetres
-        where = f"within the limits, in the {orientation_word(frame)} orientation"
+        unit = frame.state.unit_of(3)
+        where = f"Within the limits, in the {orientation_word(frame)} orientation"
         of_tool = ", of the tool" if frame.state.view.at == "tool" else ""
-        hint = f"Exact but for ± {cubic.text(measured.error, 1)}"
+        hint = f"Exact but for ± {unit.text(measured.error, 1)}"
         return (
-            f'<div class="ex-large" title="{hint}">{volume_text(newest, unit)}</div>'
-            + markup.caption(f"{volume_text(newest, other)} {where}{of_tool}")
-            + (_paper_words() if design == PRESETS["paper-optimal"] else "")
+            f'<div class="ex-large" title="{hint}">{volume_text(newest, frame.state.unit)}</div>'
+            + markup.caption(f"{where}{of_tool}")
+            + (_paper_words(unit) if design == PRESETS["paper-optimal"] else "")
         )
 
     return html_of(feed, words, "The volume could not be computed")
 
 
-def _paper_words() -> str:
+def _paper_words(unit: Unit) -> str:
     """Return what the paper says of the volume of its optimum, as HTML."""
     why = press_button(MANUAL, CLAIM, "why", class_name="ex-link")
-    return f"<div>{markup.dim(f'The paper counts 7,992 units³ by nodes of a grid: {why}')}</div>"
+    counted = unit.text(PAPER_VOLUME)
+    return f"<div>{markup.dim(f'The paper counts {counted} by nodes of a grid: {why}')}</div>"
 
 
 def drawing_words(frame: Frame, feed: Feed[work.WorkspaceRequest, work.WorkspaceDrawing]) -> str:

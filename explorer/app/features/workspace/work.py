@@ -98,9 +98,9 @@ class Trouble:
 
 def trouble_of(error: ExplorerError) -> Trouble:
     """Return an error of the library as a trouble."""
-    if not isinstance(error, StartError) or error.nearest is None:
+    if not isinstance(error, StartError):
         return Trouble(str(error))
-    return Trouble(str(error), triple(error.nearest))
+    return Trouble(error.in_millimetres, None if error.nearest is None else triple(error.nearest))
 
 
 _parts: dict[tuple[Selection, float], tuple[Part, Solid] | Trouble] = {}
