@@ -95,7 +95,7 @@ def test_nearest_length_stays_clear_of_the_singularity_at_the_end_and_says_so(
     assert Frame(closer).verdict.kind == "near"
     assert freed.remark is not None
     assert JOINTS[joint] in freed.remark
-    assert f"{high:.4g}" in freed.remark
+    assert f"{state.design.unit_mm * high:.4g} mm" in freed.remark
     assert SetPosition(0, 12.0).apply(freed).remark is None
     # With the pose held another design has other lengths.
     assert SetVariable("b1x", state.design.b1[0] + 0.5).apply(freed).remark is None

@@ -220,11 +220,8 @@ def start_faults(
     faults = [violation.words(unit) for violation in broken]
     for (i, j), depth in zip(PAIRS, (-clearance).tolist(), strict=True):
         if depth >= 0.0:
-            manner = (
-                f"overlap by {unit.text(depth) if unit else f'{depth:.4g}'}"
-                if depth > 0.0
-                else "cross"
-            )
+            length = f"{depth:.4g}" if unit is None else unit.text(depth)
+            manner = f"overlap by {length}" if depth > 0.0 else "cross"
             faults.append(f"legs {i} and {j} {manner}")
     return faults
 
