@@ -148,7 +148,7 @@ def test_guard_message_that_cannot_be_read_ends_its_own_connection_alone(
         client.connection.send(message)
         assert close_code(client.connection) == CloseCode.INTERNAL_ERROR
         before = session.state.pose.position[0]
-        other.update(other.find("x"), before + 0.25)
+        other.update(other.find("x"), 10.0 * (before + 0.25))
         wait_for(lambda: session.state.pose.position[0] == before + 0.25)
 
 

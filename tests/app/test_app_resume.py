@@ -73,15 +73,15 @@ def is_saved(data: Path, x: float) -> bool:
 def test_session_of_a_killed_explorer_is_resumed_by_the_next_one_alone(tmp_path: Path) -> None:
     with serve(tmp_path) as first:
         assert "Going on" not in first.said
-        first.drag("x", 11.0, 11.5, 12.25)
+        first.drag("x", 110.0, 115.0, 122.5)
         wait_for(lambda: is_saved(tmp_path, 12.25))
         first.process.kill()
         first.process.wait()
     with serve(tmp_path) as second:
         assert "Going on with 'paper-optimal'" in second.said
-        assert second.value("x") == 12.25
+        assert second.value("x") == 122.5
         # Another one at the same time begins anew, and takes nothing away.
         with serve(tmp_path) as third:
             assert "Going on" not in third.said
-            assert third.value("x") == 10.0
-        assert second.value("x") == 12.25
+            assert third.value("x") == 100.0
+        assert second.value("x") == 122.5

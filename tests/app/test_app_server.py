@@ -138,7 +138,7 @@ def test_server_asked_for_a_public_tunnel_opens_none(
         # What viser's page sends when somebody pushes its share button.
         client.send({"type": "ShareUrlRequest"})
         # The server reads in order.
-        client.update(client.find("x"), 9.25)
+        client.update(client.find("x"), 92.5)
         wait_for(lambda: running.page.session.state.pose.position[0] == 9.25)
     assert not asked.is_set()
 

@@ -116,7 +116,7 @@ def test_volume_after_a_change_of_the_design_is_in_sight(newcomer: Newcomer) -> 
 def test_workspace_is_cut_in_its_middle_and_a_value_is_read(newcomer: Newcomer) -> None:
     newcomer.open("Workspace")
     newcomer.press("x")
-    expect(newcomer.field("Cut at")).to_have_value(re.compile(r"^10(\.0+)?$"))
+    expect(newcomer.field("Cut at (mm)")).to_have_value(re.compile(r"^100(\.0+)?$"))
     chart = newcomer.page.get_by_role("img", name="Map of the slice at x = 100 mm")
     newcomer.wait()
     chart.scroll_into_view_if_needed()
@@ -150,7 +150,7 @@ def test_workspace_and_hull_are_exported(newcomer: Newcomer) -> None:
 def test_problem_of_the_paper_is_solved_in_two_presses(newcomer: Newcomer) -> None:
     newcomer.press("The paper's problem")
     newcomer.button("Undo The paper's problem").wait_for()
-    expect(newcomer.field("Demanded clearance")).to_have_value("0.2")
+    expect(newcomer.field("Demanded clearance (mm)")).to_have_value("2")
     newcomer.press("Optimise")
     # A search takes minutes on a busy machine.
     newcomer.page.get_by_text("Converged", exact=True).first.wait_for(timeout=300_000)
@@ -349,7 +349,7 @@ def test_theme_palette_and_keys_are_found_in_the_bar(newcomer: Newcomer) -> None
     newcomer.page.keyboard.type("home pose")
     newcomer.press(re.compile("^Pose › Home pose"))
     expect(dialog).to_have_count(0)
-    expect(newcomer.field("x")).to_have_value("10")
+    expect(newcomer.field("x")).to_have_value("100")
     newcomer.press("Help")
     card = newcomer.page.get_by_role("dialog", name="Help")
     expect(card).to_contain_text("Search commands and manual")

@@ -20,13 +20,14 @@ from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import Unit, format_number
-from explorer.optimise.defaults import PAPER_VOLUME
 from explorer.singularity.colours import BAND_EDGES, band_colours, css
 from explorer.statics.reactions import has_limits
 from explorer.workspace.position_bands import MEASURE_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
 
 CLAIM = "claims.md#The designs of Table 1 have the printed extents and a volume of 7992."
 """The place in the manual that explains the paper's volume of its optimum."""
+PAPER_COUNT = 7992.0
+"""That volume, in cubed design units."""
 
 
 def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume]) -> str:
@@ -53,7 +54,7 @@ def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume
 def _paper_words(unit: Unit) -> str:
     """Return what the paper says of the volume of its optimum, as HTML."""
     why = press_button(MANUAL, CLAIM, "why", class_name="ex-link")
-    counted = unit.text(PAPER_VOLUME)
+    counted = unit.text(PAPER_COUNT)
     return f"<div>{markup.dim(f'The paper counts {counted} by nodes of a grid: {why}')}</div>"
 
 
