@@ -17,6 +17,8 @@ from tab import Tab, middle
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import SCENE_CANVAS
 from explorer.app.state.frame import Frame
+from explorer.app.state.actions import Set
+from explorer.app.state.view import View
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.numerics.number_text import format_number
@@ -40,6 +42,7 @@ BRUSH = (50.0, 80.0)
 @pytest.fixture
 def newcomer(data_tab: Tab) -> Newcomer:
     """A newcomer at the start page in a window of a small laptop."""
+    data_tab.running.page.session.do(Set("view", View()))
     data_tab.resize(SIZE)
     return Newcomer(data_tab)
 
