@@ -482,7 +482,7 @@ OUT_OF_SIGHT = {"Presses on markup"}
 
 
 def test_control_has_a_hint_and_one_of_a_value_tells_its_unit(running: Running) -> None:
-    session, titles = running.page.session, ("Leg lengths (mm)", "Leg lengths (units)")
+    session, titles = running.page.session, ("Limits (mm)", "Limits (units)")
     for lengths, title, other in (("design units", *titles[::-1]), ("mm", *titles)):
         session.do(Set("view.lengths", lengths))
         assert session.wait_until_idle()

@@ -416,7 +416,7 @@ def test_mistakes_are_refused_with_a_reason_and_lose_nothing(
     expect(newcomer.field("1 unit (mm)")).to_have_value("10")
     newcomer.open("Optimise")
     newcomer.type("Volume (cm³)", "99999")
-    newcomer.sees("The box holds at most 12,240 of the 99,999 units³ asked for.")
+    newcomer.sees("The box holds at most 12,240 of the 99,999 cm³ asked for.")
     expect(newcomer.button("Lift the box")).to_be_visible()
     expect(newcomer.button("Optimise")).to_be_disabled()
     broken = tmp_path / "broken.json"
