@@ -16,8 +16,8 @@ from tab import Tab, middle
 
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import SCENE_CANVAS
-from explorer.app.state.frame import Frame
 from explorer.app.state.actions import Set
+from explorer.app.state.frame import Frame
 from explorer.app.state.view import View
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
