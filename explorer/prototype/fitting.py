@@ -137,12 +137,16 @@ class Buildability:
 
     @property
     def within_strokes(self) -> Design | None:
-        """The design with the strokes of its short legs as their limits; None if none is short."""
+        """The design with the strokes of its short legs as their limits.
+
+        None if none is short, or if a cylinder is too long for its rod to have any stroke.
+        """
         design, limits = self.sizes.design, dict[str, Stroke]()
         for leg in self.short_legs:
             low, high = (end / design.unit_mm for end in self.sizes.strokes[leg - 1])
             limits[LENGTHS[leg - 1]] = Stroke(_round(low, up=True), _round(high, up=False))
-        return design.with_limits(**limits) if limits else None
+        has_strokes = limits and all(low < high for low, high in limits.values())
+        return design.with_limits(**limits) if has_strokes else None
 
 
 def buildability(design: Design) -> Buildability:

@@ -68,6 +68,7 @@ from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
+from explorer.numerics.number_text import UNITS, Unit
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.parts import part_paths, write_part
 from explorer.sweep.results import Results, load_results
@@ -549,7 +550,7 @@ def results_of(columns: dict[str, list[Any]], **more: Any) -> Results:
 def test_designs_too_few_for_a_plot_are_not_drawn(volumes: list[float]) -> None:
     columns = {"b2": [0.5, 1.5][: len(volumes)], "volume": volumes, "reach": [2.0] * len(volumes)}
     results = results_of(columns)
-    assert select_rows(results, results.front(), Studies(name="s")) is None
+    assert select_rows(results, UNITS, results.front(), Studies(name="s")) is None
 
 
 def test_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -> None:
@@ -558,7 +559,7 @@ def test_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -
     wanted = (Objective("volume", "max"),)
     results = results_of(columns, objectives=wanted)
     studies = Studies(name="s", across="volume", up="b2", colour="reach")
-    seen = select_rows(results, results.front(), studies)
+    seen = select_rows(results, UNITS, results.front(), studies)
     assert seen is not None
     assert seen.axes == ("b2", "volume", "reach")
     assert_designs(seen, "points", [0, 1, 2, 3], points_html(seen))
@@ -566,7 +567,7 @@ def test_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -
     assert_designs(seen, "lines", [0, 2], lines_html(seen))
     assert "<b>2</b> without a line, which lack reach" in status_of(results, seen)
     # As an axis it places no design that lacks it, picked or not.
-    other = select_rows(results, results.front(), replace(studies, up="reach", picked=1))
+    other = select_rows(results, UNITS, results.front(), replace(studies, up="reach", picked=1))
     assert other is not None
     assert_designs(other, "points", [0, 2], points_html(other))
 
@@ -577,7 +578,7 @@ def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -
     # One that is the same in all designs is none either.
     for reach in (nan, 5.0):
         results = results_of(columns | {"reach": [reach] * 4})
-        seen = select_rows(results, results.front(), Studies(name="s"))
+        seen = select_rows(results, UNITS, results.front(), Studies(name="s"))
         assert seen is not None
         assert seen.axes == ("b2", "volume")
         assert_designs(seen, "points", [0, 1, 2, 3], points_html(seen))
@@ -586,16 +587,39 @@ def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -
     # Where no design has all axes, points are drawn and no line.
     columns |= {"volume": [4.0, 2.0, nan, nan], "reach": [nan, nan, 3.0, 1.0]}
     results = results_of(columns)
-    seen = select_rows(results, results.front(), Studies(name="s", across="b2", up="reach"))
+    seen = select_rows(results, UNITS, results.front(), Studies(name="s", across="b2", up="reach"))
     assert seen is not None
     assert_designs(seen, "points", [2, 3], points_html(seen))
     assert seen.rows["lines"].tolist() == [] == designs_in(lines_html(seen))
     assert "<b>4</b> without a line, which lack volume or reach" in status_of(results, seen)
 
 
+@pytest.mark.parametrize(
+    ("lengths", "volumes"), [(UNITS, Unit("units³", 1.0)), (Unit("mm", 25.0), Unit("cm³", 2.5**3))]
+)
+def test_study_is_written_in_the_unit_of_lengths(lengths: Unit, volumes: Unit) -> None:
+    results = results_of({"b2": [1.0, 2.0, 3.0], "volume": [4.0, 2.0, 3.0], "reach": [5.0] * 3})
+    seen = select_rows(
+        results, lengths, results.front(), Studies(name="s", across="b2", up="volume")
+    )
+    assert seen is not None
+    for name, unit in {"b2": lengths, "volume": volumes}.items():
+        assert f"{name} [{unit.name}]" in points_html(seen)
+        # Values beside an axis are round in its unit, at the places of what they say.
+        for tick in ticks_of(seen, name) * unit.factor:
+            assert float(f"{tick:.3g}") == pytest.approx(tick, rel=1e-12)
+            assert f">{unit.number(tick / unit.factor)}<" in points_html(seen)
+    row = int(np.argmax(results.columns["volume"]))
+    words, _ = reading_of(seen, "lines", row)
+    assert volumes.text(4.0) in words
+    assert lengths.text(1.0) in words
+
+
 def status_of(results: Results, seen: PlotRows) -> str:
     front = np.flatnonzero(seen.front)
-    return status(StudyDrawing(seen.studies, results, front, seen.inside, seen, ("", ""), ()))
+    return status(
+        StudyDrawing(seen.studies, results, UNITS, front, seen.inside, seen, ("", ""), ())
+    )
 
 
 class Studio:

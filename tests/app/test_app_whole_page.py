@@ -110,7 +110,7 @@ FIGURE = re.compile(r'class="ex-figure"[^>]*><span class="ex-dim">(.*?)</span><b
 ROW = re.compile("<tr[^>]*>(.*?)</tr>")
 CELL = re.compile("<td[^>]*>(.*?)</td>")
 TAG = re.compile("<[^>]*>")
-UNITS = re.compile(r",? (units[²³]?|mm[²³]?|u[²³]?|°|%)$")
+UNITS = re.compile(r",? (units[²³]?|[cm]m[²³]?|u[²³]?|°|%)$")
 NUMBER = re.compile(r"−?[\d,]+(\.\d+)?")
 # Columns of the live design: after the old one in Optimise, the first in Compare.
 COLUMN = {"old": 2}

@@ -424,6 +424,13 @@ def test_offer_is_the_least_unit_at_which_any_open_radius_fits() -> None:
         assert buildability(limited(smaller, leg_radii=(each,) * 4)).problems
 
 
+def test_cylinders_too_long_for_their_rods_have_no_strokes_as_limits() -> None:
+    # So thick are the legs that the least length of a rod in its cylinder exceeds the greatest.
+    built = buildability(limited(OPTIMAL, leg_radii=(2.0,) * 4))
+    assert any(stroke.shortest > stroke.longest for stroke in built.sizes.strokes)
+    assert built.within_strokes is None
+
+
 @pytest.mark.parametrize("design", [OPTIMAL, INITIAL, limited(OPTIMAL, leg_radii=(0.2,) * 4)])
 def test_limits_at_the_strokes_are_covered_by_the_rods(design: Design) -> None:
     assert buildability(design).short_legs == (1, 2, 3, 4)

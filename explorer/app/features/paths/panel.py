@@ -26,7 +26,12 @@ from explorer.files.extras import is_missing
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.number_text import format_decimals, format_number, snap_to_decimals
+from explorer.numerics.number_text import (
+    format_decimals,
+    format_fitted,
+    format_number,
+    snap_to_decimals,
+)
 
 EndName = Literal["start", "goal"]
 ENDS: tuple[EndName, ...] = ("start", "goal")
@@ -208,10 +213,11 @@ def end_numbers(state: State, end: EndName) -> str:
     except InputError as error:
         return f'<div class="ex-note ex-close">{escape(markup.sentence(str(error)))}</div>'
     there = position_of(state.design, pose, state.view.at)
-    position = ", ".join(map(state.unit.number, there))
+    unit, size = state.unit, state.unit.convert(state.design.reach)
+    position = ", ".join(format_fitted(unit.convert(x), size, 4) for x in there)
     angles = ", ".join(f"{format_decimals(angle, 1)}°" for angle in angles_of(pose))
     hint = f"x, y, z of {state.point}; yaw, pitch, roll"
-    return markup.note(f'<span title="{hint}">{position} {state.unit.name} · {angles}</span>')
+    return markup.note(f'<span title="{hint}">{position} {unit.name} · {angles}</span>')
 
 
 def kind_note(state: State) -> str:

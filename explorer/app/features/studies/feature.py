@@ -155,7 +155,8 @@ class StudiesPanel:
         yield self.form, "visible", is_new
         yield from self._controls.updates(frame)
         # The texts are made again only after a change.
-        key = (drawing, studies, run, self.feed.problem, is_new, frame.state.design)
+        lengths = frame.state.view.lengths
+        key = (drawing, studies, run, self.feed.problem, is_new, frame.state.design, lengths)
         if len(key) == len(self._key) and all(a is b for a, b in zip(key, self._key, strict=True)):
             return
         self._key = key
@@ -173,7 +174,7 @@ class StudiesPanel:
         yield self.points, "content", points
         yield self.legend, "content", "" if drawing is None else legend(drawing)
         yield self.table, "content", "" if drawing is None else table(drawing)
-        yield self.chips, "content", chips(studies.plan, frame.state.design)
+        yield self.chips, "content", chips(studies.plan, frame.state.design, frame.state.unit)
 
     def pick(self, index: int, who: Who) -> None:
         """Open the design with an index in the open study."""

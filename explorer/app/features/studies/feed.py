@@ -19,9 +19,10 @@ from explorer.app.features.studies.folders import StudyFolders, study_in
 from explorer.app.features.studies.state import Studies, StudyPlan
 from explorer.app.session.latest import LatestWins
 from explorer.app.state.frame import Frame
+from explorer.app.state.view import View
 from explorer.errors import ExplorerError, InputError
 from explorer.numerics.arrays import BoolArray, IntArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import Unit, format_number
 from explorer.sweep.parts import pyarrow
 from explorer.sweep.results import Results, costs, load_results
 
@@ -29,8 +30,8 @@ MOST_ON_PAGE = 100_000
 """Number of designs of the largest study that the page shows."""
 
 
-Request: TypeAlias = tuple[Studies, int]
-"""What is drawn: the studies without the plan, and the version of their results."""
+Request: TypeAlias = tuple[Studies, View, int]
+"""What is drawn: the studies without the plan, the unit of lengths, the version of the results."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class StudyDrawing:
     Attributes:
         studies: Open study, brushes, axes and pick; without the plan, which changes nothing.
         results: All rows so far.
+        lengths: Unit in which lengths are written.
         front: Rows on the Pareto front, the best in the first objective first.
         inside: Whether each row lies within all brushes, shape (n,).
         plotted: Rows and axes of the plots; None while there is nothing to show.
@@ -49,6 +51,7 @@ class StudyDrawing:
 
     studies: Studies
     results: Results
+    lengths: Unit
     front: IntArray
     inside: BoolArray
     plotted: PlotRows | None
@@ -102,7 +105,8 @@ class StudyFeed:
         if studies.name is None:
             self._request = self._drawing = self.problem = None
             return
-        request = replace(studies, plan=StudyPlan()), self._computed
+        view = View(lengths=frame.state.view.lengths)
+        request = replace(studies, plan=StudyPlan()), view, self._computed
         if request != self._request:
             self._request = request
             self._jobs.post("draw", time.monotonic(), request)
@@ -137,14 +141,16 @@ class StudyFeed:
                 self._drawing, self.problem = None, f"{why}{error}"
         self._redraw()
 
-    def _draw(self, studies: Studies, version: int) -> StudyDrawing:
+    def _draw(self, studies: Studies, view: View, version: int) -> StudyDrawing:
         results, front = self._results(str(studies.name), version)
-        seen, plots = select_rows(results, front, studies), ("", "")
+        lengths, plots = view.unit_for(results.study.base), ("", "")
+        seen = select_rows(results, lengths, front, studies)
         inside = np.ones(results.count, dtype=np.bool_) if seen is None else seen.inside
         if seen is not None:
             plots = lines_html(seen), points_html(seen)
         ordered = sort_front(results, front)
-        return StudyDrawing(studies, results, ordered, inside, seen, plots, reasons(results))
+        why = reasons(results)
+        return StudyDrawing(studies, results, lengths, ordered, inside, seen, plots, why)
 
     def _results(self, name: str, version: int) -> tuple[Results, BoolArray]:
         key = (name, version)

@@ -20,7 +20,7 @@ from explorer.app.features.studies import state
 from explorer.app.widgets.markup import by_theme, reading
 from explorer.export.drawings.mechanism import round_length
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import Unit, format_number
 from explorer.sweep.results import Results
 
 PlotName = Literal["lines", "points"]
@@ -71,6 +71,7 @@ class PlotRows:
 
     Attributes:
         results: All rows.
+        lengths: Unit in which lengths are written.
         front: Whether each row is on the Pareto front, shape (n,).
         inside: Whether each row lies within all brushes, shape (n,).
         studies: Open study, brushes, axes and pick.
@@ -85,6 +86,7 @@ class PlotRows:
     """
 
     results: Results
+    lengths: Unit
     front: BoolArray
     inside: BoolArray
     studies: state.Studies
@@ -138,12 +140,23 @@ class PlotRows:
         """Return the values of all rows."""
         return np.asarray(self.results.columns[name], dtype=np.float64)
 
+    def unit_of(self, name: str) -> Unit:
+        """Return the unit in which the values of an axis are written."""
+        return state.unit_of(name, self.lengths)
 
-def select_rows(results: Results, front: BoolArray, studies: state.Studies) -> PlotRows | None:
+    def title_of(self, name: str) -> str:
+        """Return the title of an axis as HTML."""
+        return f'<span class="title">{escape(state.title_of(name, self.lengths))}</span>'
+
+
+def select_rows(
+    results: Results, lengths: Unit, front: BoolArray, studies: state.Studies
+) -> PlotRows | None:
     """Return the rows and axes of the plots; None while there is nothing to draw.
 
     Args:
         results: All rows.
+        lengths: Unit in which lengths are written.
         front: Whether each row is on the Pareto front, shape (n,).
         studies: Open study, brushes, axes and pick.
     """
@@ -171,6 +184,7 @@ def select_rows(results: Results, front: BoolArray, studies: state.Studies) -> P
     keep[picked] = True
     return PlotRows(
         results,
+        lengths,
         front,
         state.within(columns, studies.brushes),
         studies,
@@ -260,13 +274,13 @@ def reading_of(plotted: PlotRows, plot: PlotName, row: int | None) -> tuple[str,
     """Return what is read at a row of a plot and its path, both "" for none."""
     if row is None:
         return "", ""
-    values = ", ".join(
-        f"{state.label_of(name)} {format_number(float(plotted.column(name)[row]), 4)} "
-        f"{state.unit_of(name)}".rstrip()
-        for name in plotted.axes_of(plot)
+    values = [(name, float(plotted.column(name)[row])) for name in plotted.axes_of(plot)]
+    words = ", ".join(
+        f"{state.label_of(name)} {plotted.unit_of(name).text(value)}".rstrip()
+        for name, value in values
     )
     index = plotted.results.columns["index"][row]
-    return f"Design {index}: {values}", path_of(plotted.places(plot, np.array([row])))
+    return f"Design {index}: {words}", path_of(plotted.places(plot, np.array([row])))
 
 
 def path_of(places: FloatArray) -> str:
@@ -276,15 +290,16 @@ def path_of(places: FloatArray) -> str:
 
 
 def ticks_of(plotted: PlotRows, name: str) -> FloatArray:
-    """Return the round values of an axis within its ends, ascending."""
-    low, high = plotted.ends[name]
+    """Return the values of an axis within its ends that are round in its unit, ascending."""
+    factor = plotted.unit_of(name).factor
+    low, high = (end * factor for end in plotted.ends[name])
     if plotted.is_logarithmic(name) and high > 10.0 * low:
         powers = np.arange(math.floor(math.log10(low)), math.ceil(math.log10(high)))
         ticks = np.outer(np.power(10.0, powers), (1.0, 2.0, 5.0)).ravel()
     else:
         step = round_length(0.3 * (high - low))
         ticks = step * np.arange(math.ceil(low / step), math.floor(high / step) + 1)
-    return np.array(ticks[(ticks >= low) & (ticks <= high)], dtype=np.float64)
+    return np.array(ticks[(ticks >= low) & (ticks <= high)] / factor, dtype=np.float64)
 
 
 def lines_html(plotted: PlotRows) -> str:
@@ -297,9 +312,12 @@ def lines_html(plotted: PlotRows) -> str:
         for x, name in zip(middles.tolist(), names, strict=True)
         for ends in _ranges(plotted, name)
     ]
-    titles = "".join(f'<span class="title">{escape(state.title_of(name))}</span>' for name in names)
+    titles = "".join(map(plotted.title_of, names))
     least, most = (
-        "".join(f"<span>{format_number(plotted.ends[name][end], 3)}</span>" for name in names)
+        "".join(
+            f"<span>{plotted.unit_of(name).number(plotted.ends[name][end], 3)}</span>"
+            for name in names
+        )
         for end in (0, 1)
     )
     drawing = _drawing(plotted, "lines", np.array(grid), boxes)
@@ -312,6 +330,7 @@ def lines_html(plotted: PlotRows) -> str:
 def points_html(plotted: PlotRows) -> str:
     """Return the plot of two variables or measures, with a point for each design."""
     across, up = (ticks_of(plotted, name) for name in (plotted.across, plotted.up))
+    onward, upward = plotted.unit_of(plotted.across), plotted.unit_of(plotted.up)
     x, y = plotted.place_of(plotted.across, across), plotted.place_of(plotted.up, up)
     grid = [[(at, 0.0), (at, 1.0)] for at in x] + [[(0.0, at), (1.0, at)] for at in y]
     columns, rows = _ranges(plotted, plotted.across), _ranges(plotted, plotted.up)
@@ -320,10 +339,9 @@ def points_html(plotted: PlotRows) -> str:
     drawing = _drawing(plotted, "points", np.reshape(grid, (-1, 2, 2)), boxes)
     return (
         '<div class="ex-plot is-points">'
-        f'<span class="title">{escape(state.title_of(plotted.up))}</span>'
-        f"{_values('up', 'top', 1.0 - y, up)}{drawing}{_values('across', 'left', x, across)}"
-        f'<span class="title">{escape(state.title_of(plotted.across))}</span>'
-        f"</div>{reading(HINTS['points'])}"
+        f"{plotted.title_of(plotted.up)}{_values('up', 'top', 1.0 - y, up * upward.factor)}"
+        f"{drawing}{_values('across', 'left', x, across * onward.factor)}"
+        f"{plotted.title_of(plotted.across)}</div>{reading(HINTS['points'])}"
     )
 
 

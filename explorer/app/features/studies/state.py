@@ -5,6 +5,7 @@ A study is known by its name, not by its folder: only the server knows the folde
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -17,7 +18,7 @@ from explorer.measures.catalogue import CATALOGUE, measures_in, unmet_needs
 from explorer.measures.measure import Case
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray
-from explorer.numerics.number_text import UNITS, format_number
+from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
 from explorer.sweep import study as sweeps
 from explorer.sweep.machine import MACHINE
@@ -208,13 +209,13 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> sweeps.Study:
     )
 
 
-def unit_of(name: str) -> str:
-    """Return the unit of a variable or measure as the page writes it; "" for a plain number."""
+def unit_of(name: str, lengths: Unit) -> Unit:
+    """Return the unit of a variable or measure, given that of lengths; "" for a plain number."""
     if name in CATALOGUE:
-        return CATALOGUE[name].unit_in(UNITS).name
-    if name in MACHINE:
-        return MACHINE[name].unit
-    return "°" if name == YAW else "units" if name in sweeps.NAMES else ""
+        return CATALOGUE[name].unit_in(lengths, math.inf)
+    if name in sweeps.NAMES and name != YAW and name not in MACHINE:
+        return lengths
+    return Unit("°" if name == YAW else MACHINE[name].unit if name in MACHINE else "", 1.0)
 
 
 def choices_for(design: Design, plan: StudyPlan) -> tuple[list[str], list[str]]:
@@ -241,9 +242,9 @@ def label_of(name: str) -> str:
     return CATALOGUE[name].label if is_measure else name.replace("_", " ")
 
 
-def title_of(name: str) -> str:
-    """Return the title of an axis, with its unit."""
-    unit = unit_of(name)
+def title_of(name: str, lengths: Unit) -> str:
+    """Return the title of an axis, with its unit, given that of lengths."""
+    unit = unit_of(name, lengths).name
     return f"{label_of(name)} [{unit}]" if unit else label_of(name)
 
 

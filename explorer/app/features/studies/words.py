@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
 
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.figures import FRONT, MOST_ROWS, PICKED, SCALE
-from explorer.app.features.studies.state import StudyPlan, choices_for, label_of, title_of
+from explorer.app.features.studies.state import StudyPlan, choices_for, label_of, title_of, unit_of
 from explorer.app.features.studies.work import StudyRun
 from explorer.app.widgets.buttons import extra_button, press_button
 from explorer.app.widgets.markup import box, dim, meter
@@ -17,7 +17,7 @@ from explorer.files.extras import is_missing
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import IntArray
-from explorer.numerics.number_text import decimals_for, format_decimals, format_number
+from explorer.numerics.number_text import Unit, decimals_for, format_decimals, format_number
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.study import NAMES, RADIUS, Sense, Study
@@ -184,12 +184,13 @@ def legend(drawing: StudyDrawing) -> str:
     plotted = drawing.plotted
     if plotted is None:
         return ""
-    least, most = (format_number(end, 3) for end in plotted.ends[plotted.colour])
+    unit = plotted.unit_of(plotted.colour)
+    least, most = (unit.number(end, 3) for end in plotted.ends[plotted.colour])
     bar = f'<span class="ex-legend is-inline" style="--colours:{",".join(SCALE)}"></span>'
     return (
         f'<div class="ex-note ex-dim">{_dot(FRONT)}Pareto front &nbsp; '
         f'<span class="ex-ring" style="--colour:{PICKED}"></span>picked &nbsp; '
-        f"others by {escape(title_of(plotted.colour))}: {least}{bar}{most}</div>"
+        f"others by {escape(title_of(plotted.colour, plotted.lengths))}: {least}{bar}{most}</div>"
     )
 
 
@@ -215,17 +216,27 @@ def table(drawing: StudyDrawing) -> str:
         return ""
     objectives = [objective.measure for objective in study.objectives]
     names = tuple(dict.fromkeys((*objectives, *study.varied)))[:MOST_COLUMNS]
+    units = {name: unit_of(name, drawing.lengths) for name in names}
     head = "".join(
-        f'<span title="{escape(_hint(name))}">{escape(label_of(name))}{_arrow(study, name)}</span>'
+        f'<span title="{escape(_hint(name, drawing.lengths))}">'
+        f"{escape(title_of(name, drawing.lengths))}{_arrow(study, name)}</span>"
         for name in names
     )
+    columns = {name: results.columns[name] * unit.factor for name, unit in units.items()}
     # As many decimals as give the largest value on the front four digits.
-    largest = {name: np.abs(results.columns[name][drawing.front]).max(initial=0) for name in names}
+    largest = {name: np.abs(each[drawing.front]).max(initial=0) for name, each in columns.items()}
     decimals = {
         name: min(6, decimals_for(float(size), 4)) if size > 0 else 0
         for name, size in largest.items()
     }
-    lines = "".join(_line(drawing, int(row), decimals) for row in rows.tolist())
+    lines = "".join(
+        _line(
+            drawing,
+            int(row),
+            [format_decimals(float(columns[name][row]), decimals[name]) for name in names],
+        )
+        for row in rows.tolist()
+    )
     count, inside = len(drawing.front), len(drawing.front_inside)
     among = format_number(count)
     if inside < count:
@@ -238,13 +249,9 @@ def table(drawing: StudyDrawing) -> str:
     )
 
 
-def _line(drawing: StudyDrawing, row: int, decimals: Mapping[str, int]) -> str:
-    columns = drawing.results.columns
-    index = int(columns["index"][row])
-    cells = "".join(
-        f"<span>{format_decimals(float(columns[name][row]), digits)}</span>"
-        for name, digits in decimals.items()
-    )
+def _line(drawing: StudyDrawing, row: int, values: Sequence[str]) -> str:
+    index = int(drawing.results.columns["index"][row])
+    cells = "".join(f"<span>{value}</span>" for value in values)
     is_picked = index == drawing.studies.picked
     return press_button(
         "studies.pick",
@@ -255,26 +262,27 @@ def _line(drawing: StudyDrawing, row: int, decimals: Mapping[str, int]) -> str:
     )
 
 
-def chips(plan: StudyPlan, design: Design) -> str:
+def chips(plan: StudyPlan, design: Design, lengths: Unit) -> str:
     """Return the switches of the variables and measures of a new study, as HTML.
 
     Args:
         plan: The new study.
         design: The design it is around, whose machine may allow more of them.
+        lengths: Unit in which lengths are written.
     """
     variables, measures = choices_for(design, plan)
     varying = "".join(
         _chip(
             "vary",
             name,
-            f"{'Keep' if name in plan.variables else 'Vary'} {_variable_words(name)}",
+            f"{'Keep' if name in plan.variables else 'Vary'} {_variable_words(name, lengths)}",
             is_on=name in plan.variables,
         )
         for name in variables
     )
     senses = dict(plan.objectives)
     measured = "".join(
-        _chip("measure", name, _hint(name), senses.get(name), is_on=name in plan.measures)
+        _chip("measure", name, _hint(name, lengths), senses.get(name), is_on=name in plan.measures)
         for name in measures
     )
     groups = (
@@ -307,21 +315,21 @@ def _arrow(study: Study, name: str) -> str:
     return f" {ARROWS[senses[name]]}" if name in senses else ""
 
 
-def _hint(name: str) -> str:
+def _hint(name: str, lengths: Unit) -> str:
     measure = measures_in("studies").get(name)
     if measure is None:
-        return _variable_words(name)
+        return _variable_words(name, lengths)
     return f"{measure.hint}{'; slow to compute' if measure.cost == 'high' else ''}"
 
 
-def _variable_words(name: str) -> str:
+def _variable_words(name: str, lengths: Unit) -> str:
     words = {
         YAW: "the yaw of home [°]",
-        REACH: "one maximum for all lengths [units]",
-        RADIUS: "one radius for all legs [units]",
+        REACH: f"one maximum for all lengths [{lengths.name}]",
+        RADIUS: f"one radius for all legs [{lengths.name}]",
         **{other: f"the {each.words} [{each.unit}]" for other, each in MACHINE.items()},
     }
-    return words.get(name, title_of(name)) if name in NAMES else name
+    return words.get(name, title_of(name, lengths)) if name in NAMES else name
 
 
 def _dot(colour: str) -> str:
