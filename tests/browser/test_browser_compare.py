@@ -80,7 +80,7 @@ def test_button_in_markup_that_is_pressed_by_a_key_keeps_the_focus(tab: Tab) -> 
     expect(bars).to_have_attribute("aria-pressed", "true")
     expect(bars).to_be_focused()
     # Neither is lost by what is pressed twice.
-    mm = tab.page.get_by_role("button", name="mm", exact=True)
+    outlines = tab.page.get_by_role("button", name="Outlines", exact=True)
     for pressed in ("true", "false"):
-        mm.click()
-        expect(mm).to_have_attribute("aria-pressed", pressed)
+        outlines.click()
+        expect(outlines).to_have_attribute("aria-pressed", pressed)

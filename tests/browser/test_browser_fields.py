@@ -154,6 +154,7 @@ def test_number_that_arrives_leaves_a_field_selected_so_that_typing_replaces_it(
 def test_length_may_be_typed_in_another_unit_and_what_is_none_is_explained(tab: Tab) -> None:
     for lengths in ("mm", "design units"):
         tab.running.page.session.do(Set("view.lengths", lengths))
+        tab.settle()
         for text, value in (("120 mm", 12.0), ("12,5 cm", 12.5), ("1 in", 2.54), ("4 units", 4.0)):
             tab.type("x", f"{text}\n")
             tab.wait_for(lambda value=value: tab.state.pose.position[0] == value, f"x = {text}")

@@ -70,7 +70,7 @@ def test_bar_of_any_window_shows_the_verdict_and_cuts_no_figure(
             figures = tab.page.evaluate(FIGURES)
             shown = [words for words, parts in figures if parts[0] != "hidden"]
             assert all(parts in ([True] * 3, ["hidden"] * 3) for _, parts in figures), figures
-            assert "Nearest singular pose\n10.3 mm of motion" in shown
+            assert "Nearest singular pose\n1.03 units of motion" in shown
             assert len(shown) >= least
             expect(tab.page.locator("[data-document]")).to_be_in_viewport(ratio=1.0)
         # On a phone, the last of the windows, the panels are below the scene.

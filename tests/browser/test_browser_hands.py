@@ -334,7 +334,7 @@ def test_tour_leads_through_five_steps_once(browser: Browser) -> None:
                 tab.page.get_by_text("Done", exact=True).wait_for()
             if number < len(STEPS):
                 button_of(tab, "Next").click()
-        tab.page.get_by_text(re.compile(r"grew from 870\.7 to 8,000 units³")).wait_for()
+        tab.page.get_by_text(re.compile(r"grew from 870\.7 to 8,000 cm³")).wait_for()
         button_of(tab, "Finish").click()
         tab.page.get_by_text("step 5 of 5").wait_for(state="detached")
         wait_until_back(tab)

@@ -18,7 +18,7 @@ def test_optimise_finds_a_design_shows_it_gives_its_files_and_takes_it(tab: Tab)
     accept = tab.page.get_by_role("button", name="Accept", exact=True)
     expect(accept).to_have_count(0)
     tab.choose("Objective", "shortest legs for a volume")
-    expect(tab.field("Volume")).to_have_value("7053.04")
+    expect(tab.field("Volume (units³)")).to_have_value("7053.04")
     tab.settle()
     tab.push("Optimise")
     # A search takes minutes on a busy machine.

@@ -54,7 +54,7 @@ def open_map(tab: Tab, level: float) -> None:
 def move_cut(tab: Tab, level: float) -> None:
     """Cut the workspace at another y, and wait until its map is drawn and rests."""
     tab.running.page.session.do(Set("view.workspace.level", level))
-    expect(map_in(tab)).to_have_attribute("aria-label", f"Map of the slice at y = {level:g}")
+    expect(map_in(tab)).to_have_attribute("aria-label", f"Map of the slice at y = {level:g} units")
     tab.settle()
 
 
