@@ -52,8 +52,8 @@ from explorer.numerics.arrays import FloatArray
 
 # The features, in the order of their tabs and of their parts of the bar.
 FEATURES: tuple[Feature, ...] = (
-    DESIGNS, MECHANISM, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, LEGS, ORIENTATION, LOADS,
-    PROTOTYPE, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
+    DESIGNS, MECHANISM, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, ORIENTATION, LOADS,
+    PROTOTYPE, LEGS, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
 )  # fmt: skip
 # Modules that the worker imports at its start.
 TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})

@@ -182,7 +182,7 @@ def test_problem_of_the_paper_is_solved_in_two_presses(newcomer: Newcomer) -> No
     newcomer.presses_for()
     newcomer.press(re.compile("^Set the unit to "))
     newcomer.sees("Strokes too short")
-    expect(newcomer.figure("Buildable")).to_have_count(0)
+    expect(newcomer.figure("Buildable")).to_contain_text("strokes too short")
     assert newcomer.presses_for() == 1
 
 

@@ -350,6 +350,8 @@ def draw_studies(browser: Browser) -> bytes:
             page, client = open_page(browser, running, (1280, 1000))
             page.get_by_role("tab", name="Studies", exact=True).click()
             page.locator("[data-plot]").nth(1).wait_for()
+            # The drawer moves until it is open.
+            settle(page, client)
             pull_drawer(page, 300)
             settle(page, client)
             running.page.point_cameras("isometric")

@@ -18,7 +18,6 @@ from explorer.app.state.state import Gesture, State
 from explorer.app.state.view import View
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES
-from explorer.numerics.number_text import format_number
 
 # Number of steps beyond which the oldest are dropped.
 MOST_STEPS = 1000
@@ -238,8 +237,8 @@ def check_drawable(state: State) -> None:
         for name, value in zip(names, values, strict=True):
             # Also where it is no number.
             if not abs(value) <= LARGEST_SHARE * reach:
-                most = format_number(LARGEST_SHARE * reach)
+                most = state.unit.text(LARGEST_SHARE * reach)
                 raise InputError(
-                    f"{name} = {format_number(value)} is too far to be drawn; "
+                    f"{name} = {state.unit.text(value)} is too far to be drawn; "
                     f"{most}, a million times the reach, is the most"
                 )

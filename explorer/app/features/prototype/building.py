@@ -1,7 +1,7 @@
 """Whether the machine can be built with its parts: the verdict, and the presses that mend it.
 
 The worker finds it for each design. The tabs Prototype and Optimise and the dialog Export show it,
-and the bar while parts do not fit.
+and the bar while it is negative.
 """
 
 from __future__ import annotations
@@ -26,10 +26,6 @@ from explorer.prototype.sizes import Stroke
 MEND = "prototype.mend"
 FITTING, STROKES = "fitting", "strokes"
 """What a press mends: the unit and home of parts that do not fit, or limits beyond the strokes."""
-STROKES_PROBLEM = (
-    "the rods of legs {} cannot make all lengths that the limits allow: a rod in its cylinder at "
-    "most doubles the length of a leg"
-)
 STROKES_WORDS = "Limit the lengths to the strokes"
 STROKES_HINT = (
     "Set the limits of the lengths to what a rod in its cylinder reaches; the workspace may shrink."
@@ -67,12 +63,14 @@ class BuildVerdict:
         return html_of(self._feed, verdict_words, "The parts could not be sized")
 
     def in_bar(self, _: Frame) -> str:
-        """Return that parts do not fit as a figure of the bar; "" if they do."""
+        """Return why the machine cannot be built as a figure of the bar; "" if it can."""
         built = self._feed.drawing
-        if built is None or not built.problems:
+        if built is None or not (built.problems or built.short_legs):
             return ""
-        hint = " ".join(map(sentence, (*built.problems, built.advice)))
-        return figure("Prototype", "Buildable", "no", hint=hint, look="ex-beyond")
+        words = "no" if built.problems else "strokes too short"
+        clauses = (*built.problems, built.advice) if built.problems else (strokes_problem(built),)
+        hint = " ".join(map(sentence, clauses))
+        return figure("Prototype", "Buildable", words, hint=hint, look="ex-beyond")
 
     def _mend(self, what: str, state: State) -> Set | None:
         built = self._feed.drawing
@@ -105,11 +103,18 @@ def verdict_words(built: Buildability) -> str:
         else:
             press = _button(FITTING, mend_words(built), sentence(built.advice))
     else:
-        legs = ", ".join(map(str, built.short_legs))
-        head, problems = "Strokes too short", [STROKES_PROBLEM.format(legs)]
+        head, problems = "Strokes too short", [strokes_problem(built)]
         press = _button(STROKES, STROKES_WORDS, STROKES_HINT)
     words = escape(" ".join(map(sentence, problems)))
     return f"{status(head, 'beyond')}<div>{words}</div>{press}"
+
+
+def strokes_problem(built: Buildability) -> str:
+    """Return the clause on the legs whose strokes are too short."""
+    return (
+        f"the rods of legs {', '.join(map(str, built.short_legs))} cannot make all lengths that "
+        "the limits allow: a rod in its cylinder at most doubles the length of a leg"
+    )
 
 
 def _button(value: str, words: str, hint: str) -> str:
