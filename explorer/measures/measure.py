@@ -272,8 +272,8 @@ class Measure:
     def unit_in(self, lengths: number_text.Unit, size: float = 0.0) -> number_text.Unit:
         """Return the unit, given that of lengths; its name is "" for a plain number or a share.
 
-        The size, in design units, is that of `Unit.raised`.
+        The size, in design units, is that of `Unit.to_power`.
         """
         if self.power:
-            return lengths.raised(self.power, size)
+            return lengths.to_power(self.power, size)
         return number_text.Unit("" if self.unit == "share" else self.unit, 1.0)

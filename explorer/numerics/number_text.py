@@ -22,7 +22,7 @@ LEAST_POWER, MOST_POWER = -4, 9
 POWERS = {1: "", 2: "²", 3: "³"}
 """Signs of powers of units."""
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-# Sizes from which on, and below which, a number that holds still is written without one.
+# Sizes from which on, and below which, a number fitted to its size is written without one.
 LEAST_SIZE, MOST_SIZE = 1e-3, 1e7
 # Share of its size up to which a number is a rounding error.
 ROUNDING = 1e-12
@@ -42,12 +42,12 @@ class Unit(NamedTuple):
     def convert(self, value: float) -> float:
         """Return a value in this unit, given one in design units.
 
-        Of fifteen digits, so that 0.7 mm is read as the number that is written as 0.7 mm.
+        It has fifteen significant digits, so that a text such as 0.7 mm is read as it was written.
         """
         return value if self.factor == 1.0 else float(f"{value * self.factor:.15g}")
 
     def read(self, value: float) -> float:
-        """Return a value in design units, given one in this unit, likewise."""
+        """Return a value in design units, of fifteen digits too, given one in this unit."""
         return value if self.factor == 1.0 else float(f"{value / self.factor:.15g}")
 
     def text(self, value: float, digits: int = 4, *, size: float = 0.0) -> str:
@@ -58,8 +58,8 @@ class Unit(NamedTuple):
         """Return the number of `text` alone."""
         return format_number(value * self.factor, digits, size=size * self.factor)
 
-    def raised(self, power: int, size: float = 0.0) -> Unit:
-        """Return the unit of areas or volumes; of large volumes beside mm that is cm³.
+    def to_power(self, power: int, size: float = 0.0) -> Unit:
+        """Return the unit of a power of length; in place of mm³, cm³ for volumes of 1 cm³ or more.
 
         Args:
             power: Exponent of length, 1 to 3.
@@ -153,7 +153,7 @@ def format_column(
 
 
 def format_fitted(value: float, size: float, digits: int, *, infinite: str = "infinite") -> str:
-    """Return a number whose decimals depend on a size alone, so that it holds still as it changes.
+    """Return a number whose decimals depend on a size alone and do not change with the number.
 
     The size is that of the largest number expected, which has so many digits. A number that would
     look like 0, though it is none, has digits of its own.

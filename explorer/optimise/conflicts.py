@@ -170,7 +170,7 @@ def volume_bounds(intervals: Intervals) -> Iterator[tuple[str, str, float]]:
 
 def _of_volume(intervals: Intervals) -> Iterator[Conflict]:
     wanted = intervals.problem.demands.volume or 0.0
-    unit = intervals.unit.raised(3, wanted)
+    unit = intervals.unit.to_power(3, wanted)
     for limit, words, most in volume_bounds(intervals):
         if most < wanted * (1.0 - SPARE):
             # As many digits as let them differ.

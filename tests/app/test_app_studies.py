@@ -719,7 +719,7 @@ def test_study_whose_process_dies_is_reported_and_keeps_what_is_finished(studio:
     assert number is not None
     os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
     assert studio.runner.wait_until_idle(PATIENCE)
-    assert any("Continue starts it again" in each for each in studio.desk.complaints)
+    assert any("Continue the study" in each for each in studio.desk.complaints)
     assert studio.runner.run is None
     name = Studies.of(studio.desk.state).name
     assert name is not None

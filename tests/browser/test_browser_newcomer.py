@@ -258,7 +258,7 @@ def test_study_is_started_brushed_and_a_design_of_it_picked(newcomer: Newcomer) 
     # The words of an axis stand above its middle.
     x, y = middle(newcomer.sees("volume [cm³]"))
     newcomer.drag((x, y + BRUSH[0]), (x, y + BRUSH[1]))
-    within = numbers(newcomer.sees("within the brushes").inner_text())
+    within = numbers(newcomer.sees("within the filters").inner_text())
     assert 0.0 < within[-1] < 32.0
     newcomer.wait()
     row = newcomer.button(re.compile(r"^\d+ [\d,]+ "))

@@ -110,7 +110,7 @@ def bound_to(
 def in_unit(bound: Bound[Any], power: int) -> Bound[Any]:
     """Return the binding of a control that shows lengths, or a power of them, in the view's unit.
 
-    Of several values those that stay as they were shown keep their last bit.
+    Of several values, one that is written back as it was shown keeps its exact value.
     """
 
     def read(frame: Frame) -> Any:

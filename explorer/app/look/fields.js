@@ -1,6 +1,7 @@
 // Lets number fields take a value only when it is complete, lets lines of text be emptied and typed
 // again, and sends keys where a user expects them.
 window.explorer.fields ??= (() => {
+  // Milliseconds of rest after which a typed number is entered.
   const PAUSE = 700;
   const { clock } = window.explorer;
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
@@ -39,8 +40,9 @@ window.explorer.fields ??= (() => {
     const value = factor === 1 ? Number(number) : Number((number * factor).toPrecision(15));
     return Math.abs(value) <= Number.MAX_SAFE_INTEGER ? value : null;
   };
+  // Milliseconds for which a refusal stays.
   const LIFE = 6000;
-  // A sentence below a field on what it takes, until another field has the focus or time is over.
+  // Shows below a field what it takes, until another field has the focus.
   const explain = (field, unit) => {
     document.querySelector(".ex-refusal")?.remove();
     const allowed = Number.isFinite(ofUnits(unit))

@@ -1,8 +1,8 @@
 // Opens files: those that the button of the dialog Designs chooses, and those dropped anywhere on
 // the page. viser's own upload would report success before the server has read the file.
 window.explorer.files ??= (() => {
-  // Bytes of a file that are sent at most, so that the server refuses what is too large; bytes of
-  // a part.
+  // Most bytes of a file that are sent, with which the server refuses what is too large; bytes of a
+  // part.
   const MOST = 32e6,
     PART = 2 ** 19;
   const root = document.documentElement;
@@ -71,7 +71,7 @@ window.explorer.files ??= (() => {
     delete root.dataset.drop;
     open(event.dataTransfer.files);
   });
-  // Files of a lost connection are not sent to the next one.
+  // Called with the id of the button on each connection; no file waits from one to the next.
   return (uuid) => {
     button = uuid;
     waiting = [];

@@ -3,15 +3,15 @@
 window.explorer.plots ??= (() => {
   const { clock } = window.explorer;
   // Pixels beyond which a press is a drag; milliseconds in which a click may become a double one.
-  const LEAST = 4,
-    AGAIN = 300;
+  const DRAG_PIXELS = 4,
+    DOUBLE_CLICK = 300;
   const plotAt = (target) => target?.closest?.("[data-plot]") ?? null;
   const within = (share) => Math.min(1, Math.max(0, share));
   const placeIn = (plot, { clientX, clientY }) => {
     const { left, bottom, width, height } = plot.getBoundingClientRect();
     return [within((clientX - left) / width), within((bottom - clientY) / height)];
   };
-  const tell = (plot, act, end, start = end) => {
+  const send = (plot, act, end, start = end) => {
     const { width, height } = plot.getBoundingClientRect();
     const event = { ...JSON.parse(plot.dataset.plot), act, start, end, size: [width, height] };
     window.explorer.press("studies.plot", JSON.stringify(event));
@@ -22,16 +22,15 @@ window.explorer.plots ??= (() => {
     reading.textContent = words || reading.dataset.hint;
     plot.querySelector(".near").setAttribute("d", path);
   };
-  // The press that goes on; the plot under the pointer and the place there; the ones that the server
-  // is asked about, again once it has answered if the pointer is elsewhere by then; the pick that
-  // waits.
+  // The press that has not ended; the plot under the pointer with the place there; the plot and the
+  // place whose reading the server has not answered yet; the pick that waits for a second click.
   let pressed = null,
     pointer = null,
     asked = null,
     picking = null;
   const ask = () => {
     asked = pointer;
-    tell(pointer.plot, "read", pointer.place);
+    send(pointer.plot, "read", pointer.place);
   };
   const draw = ({ plot, start }, end) => {
     const box = plot.querySelector(".drag"),
@@ -57,7 +56,7 @@ window.explorer.plots ??= (() => {
     if (!asked) ask();
   });
   const isDrag = ({ clientX, clientY }) =>
-    Math.hypot(clientX - pressed.x, clientY - pressed.y) > LEAST;
+    Math.hypot(clientX - pressed.x, clientY - pressed.y) > DRAG_PIXELS;
   addEventListener("pointerdown", (event) => {
     const plot = plotAt(event.target);
     if (!plot || event.button !== 0) return;
@@ -68,8 +67,8 @@ window.explorer.plots ??= (() => {
     const { plot, start } = pressed,
       end = placeIn(plot, event);
     clock.cancel(picking);
-    if (isDrag(event)) tell(plot, "brush", end, start);
-    else picking = clock.after(AGAIN, () => tell(plot, "pick", end));
+    if (isDrag(event)) send(plot, "brush", end, start);
+    else picking = clock.after(DOUBLE_CLICK, () => send(plot, "pick", end));
     draw(pressed, start);
     pressed = null;
   });
@@ -81,11 +80,12 @@ window.explorer.plots ??= (() => {
     const plot = plotAt(event.target);
     if (!plot) return;
     clock.cancel(picking);
-    tell(plot, "free", placeIn(plot, event));
+    send(plot, "free", placeIn(plot, event));
   });
   return (name, words, path) => {
     if (!asked || JSON.parse(asked.plot.dataset.plot).plot !== name) return;
     show(asked.plot, words, path);
+    // The pointer may have moved on since it was asked.
     const isElsewhere = asked !== pointer;
     asked = null;
     if (isElsewhere) ask();

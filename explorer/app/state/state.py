@@ -210,7 +210,7 @@ class State:
 
     def unit_of(self, power: int) -> Unit:
         """Return the unit of quantities with a power of length, such as 3 for volumes."""
-        return self.unit.raised(power, self.design.reach**3)
+        return self.unit.to_power(power, self.design.reach**3)
 
     @property
     def point(self) -> str:

@@ -139,7 +139,7 @@ def workspace_clearances(
         radius = block.measured(0.5 * least, unit, 3)
         yield block.Statement("", ("No two legs collide if all radii grow by up to ", radius, "."))
     bounds, blocked = [pair.bound for pair in pairs], [pair.blocked_volume for pair in pairs]
-    cubic = unit.raised(3, design.reach**3)
+    cubic = unit.to_power(3, design.reach**3)
     values = [cubic.factor * volume for volume in blocked]
     column = block.Column("blocked alone", values, f" {cubic.name}")
     certified = block.Column("certified", bounds, " units", DIGITS, infinite="", wide=True)

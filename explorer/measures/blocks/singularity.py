@@ -116,7 +116,7 @@ def conditioning(snapshot: Snapshot, unit: Unit = UNITS) -> block.Facts:
     """Return the measures of the actuator Jacobian J, the mode and the stratum."""
     worst = int(snapshot.transmissions.argmin())
     size = snapshot.design.reach**3
-    determinant = block.measured(snapshot.determinant, unit.raised(3, size), size=size)
+    determinant = block.measured(snapshot.determinant, unit.to_power(3, size), size=size)
     return block.Facts(
         "Conditioning",
         (

@@ -272,7 +272,7 @@ def _exact_text(measure: Measure, column: Column) -> str:
     if measure.power == 0:
         return column.unit_of(measure).text(value, 12).strip()
     size, units = column.design.reach**3, (number_text.UNITS, column.design.millimetres)
-    return " = ".join(unit.raised(measure.power, size).text(value, 12) for unit in units)
+    return " = ".join(unit.to_power(measure.power, size).text(value, 12) for unit in units)
 
 
 def bars(columns: Sequence[Column]) -> str:

@@ -83,7 +83,7 @@ BUTTONS: Mapping[str, Button] = {
     PAPER: Button(
         "The paper's problem",
         "Open the paper's initial design within the box of its optimum, and ask for its volume of "
-        "8000 with a clearance of 0.2; one undo brings your design back.",
+        "8,000 cm³ with a clearance of 2 mm; one undo brings your design back.",
         lambda state: not state.optimisation.is_on,
         lambda _, __: actions.TakePaperProblem(),
     ),

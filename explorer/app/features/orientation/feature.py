@@ -229,7 +229,7 @@ def range_words(drawing: work.RangeDrawing, unit: Unit) -> str:
         return alert("This workspace is empty", f"Emptied by: {', '.join(solid.empty_because)}.")
     bound, hint = BOUNDS[drawing.request.over]
     size = design.reach**3
-    text = f"{bound} {unit.raised(3, size).text(solid.volume, 5, size=size)}"
+    text = f"{bound} {unit.to_power(3, size).text(solid.volume, 5, size=size)}"
     name = dim(f"{drawing.request.over.capitalize()} workspace")
     return table((row(name, text, hint=f"{VOLUME_HINT} {hint}"),))
 

@@ -54,7 +54,7 @@ class BrushAxes(Action):
 
     def words(self) -> str:
         """Return what the action does."""
-        verb = "Brush" if any(brush.ranges for brush in self.brushes) else "Free"
+        verb = "Filter" if any(brush.ranges for brush in self.brushes) else "Free"
         return f"{verb} {' and '.join(label_of(brush.axis) for brush in self.brushes)}"
 
 

@@ -79,7 +79,7 @@ class StudyFeed:
 
     def __init__(self, folders: StudyFolders, redraw: Callable[[], None]) -> None:
         self.folders = folders
-        # The thread would redraw a page that is not complete yet.
+        # Read here: the thread would redraw a page that is not complete yet.
         self.names = tuple(folders.by_name())
         self.problem: str | None = None
         self._redraw = redraw

@@ -25,7 +25,8 @@ from explorer.sweep.machine import MACHINE
 
 Range: TypeAlias = tuple[float, float]
 
-# A variable near zero varies as if it were this share of the reach; an angle by a share of this.
+# A variable near zero varies as if its value were this share of the reach; the yaw varies by a
+# percentage of this angle, in degrees.
 LEAST_SHARE, RIGHT_ANGLE = 0.05, 90.0
 # Number of parts of a study from the page, about; each is shown as soon as it is computed.
 PARTS = 40

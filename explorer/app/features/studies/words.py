@@ -38,7 +38,7 @@ BUTTONS = {
     "cancel": ("Cancel study", "End the study; finished designs are kept."),
     "continue": ("Continue the study", "Compute the designs of the open study that are missing."),
     "new": ("New study", "Close the study, and set up a small one around the live design."),
-    "clear": ("Clear brushes", "Free all axes."),
+    "clear": ("Clear filters", "Free all axes."),
 }
 """Words and hint of each button, by its name."""
 
@@ -59,7 +59,7 @@ def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
     if drawing.studies.brushes:
         hint = BUTTONS["clear"][1]
         clear = press_button("studies.clear", "", "clear", hint=hint, class_name="ex-link")
-        parts.append(f"<b>{format_number(inside)}</b> within the brushes {clear}")
+        parts.append(f"<b>{format_number(inside)}</b> within the filters {clear}")
     plotted = drawing.plotted
     if plotted is not None and plotted.count > MOST_ROWS["lines"]:
         points, lines = (format_number(len(plotted.rows[plot])) for plot in ("points", "lines"))
@@ -154,7 +154,7 @@ def head(
 
 
 def acts(run: StudyRun | None, looks: str, *, is_new: bool, can_go_on: bool) -> str:
-    """Return the buttons on top of the tab as HTML.
+    """Return the buttons at the top of the tab as HTML.
 
     Args:
         looks: Switches of how the open study is drawn, HTML.

@@ -31,7 +31,7 @@ PACE = 2.0
 # Seconds after which the process of a cancelled study is ended; workers that are about to begin
 # notice late.
 PATIENCE = 5.0
-DIED = "the study's process died; finished designs are kept, and Continue starts it again"
+DIED = "the study's process died; finished designs are kept; press Continue the study"
 
 
 @dataclass(frozen=True)

@@ -128,7 +128,7 @@ def volume_text(drawing: work.MeasuredVolume | None, unit: Unit) -> str:
     if drawing.measured.volume <= 0.0:
         return "empty"
     size = drawing.request.design.reach**3
-    return unit.raised(3, size).text(drawing.measured.volume, size=size)
+    return unit.to_power(3, size).text(drawing.measured.volume, size=size)
 
 
 def workspace_details(
