@@ -260,10 +260,10 @@ class StudiesPanel:
             buttons.on(f"studies.{name}", handle)
             buttons.offer(f"Studies › {words}", hint, f"studies.{name}", is_ready=is_ready)
         buttons.on("studies.pick", self._pick_row)
-        do_on_press = self._services.do_on_press
-        do_on_press("studies.vary", partial(_turn, StudyPlan.with_variable_toggled), NAMES)
-        measures = measures_in("studies")
-        do_on_press("studies.measure", partial(_turn, StudyPlan.with_measure_advanced), measures)
+        vary = partial(_set_plan, StudyPlan.with_variable_toggled)
+        measure = partial(_set_plan, StudyPlan.with_measure_advanced)
+        self._services.do_on_press("studies.vary", vary, NAMES)
+        self._services.do_on_press("studies.measure", measure, measures_in("studies"))
 
     def _start(self, _: str, client: viser.ClientHandle) -> None:
         state = self._session.latest_state()
@@ -283,10 +283,10 @@ class StudiesPanel:
             self.pick(int(index), client.client_id)
 
 
-def _turn(turn: Callable[[StudyPlan, str], StudyPlan], name: str) -> Change:
+def _set_plan(change: Callable[[StudyPlan, str], StudyPlan], name: str) -> Change:
     """Return the change that a press on a variable or measure of the new study makes."""
     return lambda state: Set(
-        "studies.plan", turn(Studies.of(state).plan, name), "New study", label_of(name)
+        "studies.plan", change(Studies.of(state).plan, name), "New study", label_of(name)
     )
 
 
