@@ -144,8 +144,8 @@ def test_study_accepts_a_new_measure() -> None:
     assert decode_study(encode_study(known), "the study") == known
     rows = evaluate(encode_study(known), 0, 2).columns
     assert rows[NEW.name] == [pytest.approx(0.5 * abs(float(y or 0.0))) for y in rows["a3y"]]
-    assert title_of(NEW.name) == f"{NEW.label} [units²]"
-    assert NEW.hint in chips(StudyPlan(), DESIGN)
+    assert title_of(NEW.name, UNITS) == f"{NEW.label} [units²]"
+    assert NEW.hint in chips(StudyPlan(), DESIGN, UNITS)
 
 
 def test_report_lists_a_new_measure() -> None:
