@@ -39,7 +39,7 @@ OF_ALL = ("what", "out", "format", "design", "json")
 
 @dataclass(frozen=True, kw_only=True)
 class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
-    """Write the workspace, the mechanism, its simulation, the scene or a figure as a file.
+    """Write the workspace, the parts, a simulation, the scene or a figure as a file.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
