@@ -104,7 +104,8 @@ def verdict_words(built: Buildability) -> str:
             press = _button(FITTING, mend_words(built), sentence(built.advice))
     else:
         head, problems = "Strokes too short", [strokes_problem(built)]
-        press = _button(STROKES, STROKES_WORDS, STROKES_HINT)
+        can_limit = built.within_strokes is not None
+        press = _button(STROKES, STROKES_WORDS, STROKES_HINT) if can_limit else ""
     words = escape(" ".join(map(sentence, problems)))
     return f"{status(head, 'beyond')}<div>{words}</div>{press}"
 
