@@ -79,7 +79,7 @@ class Vector(msgspec.Struct, frozen=True):
         return Column("", self.values, digits=self.digits, span=self.span).texts
 
 
-def measured(
+def quantity(
     value: float, unit: Unit, digits: int = 4, *, size: float = 0.0, span: float = 0.0
 ) -> Number:
     """Return a number in a unit, given the value, the size and the span in design units."""

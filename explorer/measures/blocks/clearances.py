@@ -43,7 +43,7 @@ def verdict(
     elif (bound <= 0.0).any():
         title, look = f"Legs {names_of(bound <= 0.0)} touch{where}", "close"
     pair = int(clearance.argmin())
-    least = block.measured(float(clearance[pair]), unit, 3, size=design.reach)
+    least = block.quantity(float(clearance[pair]), unit, 3, size=design.reach)
     return block.Statement(
         title, (f"Least clearance: legs {pair_name(PAIRS[pair])}, ", least), look
     )
@@ -136,7 +136,7 @@ def workspace_clearances(
         return
     yield verdict(clearance, clearance, design, unit, " in the workspace")
     if (least := float(clearance.min())) > 0.0:
-        radius = block.measured(0.5 * least, unit, 3)
+        radius = block.quantity(0.5 * least, unit, 3)
         yield block.Statement("", ("No two legs collide if all radii grow by up to ", radius, "."))
     bounds, blocked = [pair.bound for pair in pairs], [pair.blocked_volume for pair in pairs]
     cubic = unit.to_power(3, design.reach**3)

@@ -116,7 +116,7 @@ def conditioning(snapshot: Snapshot, unit: Unit = UNITS) -> block.Facts:
     """Return the measures of the actuator Jacobian J, the mode and the stratum."""
     worst = int(snapshot.transmissions.argmin())
     size = snapshot.design.reach**3
-    determinant = block.measured(snapshot.determinant, unit.to_power(3, size), size=size)
+    determinant = block.quantity(snapshot.determinant, unit.to_power(3, size), size=size)
     return block.Facts(
         "Conditioning",
         (
@@ -286,7 +286,7 @@ def free_ball(
         return block.Fact("singularity-free radius", f"none: δ{ball.incidence} = 0 here", hint=hint)
     return block.Fact(
         "singularity-free radius",
-        (block.measured(ball.radius, unit or snapshot.design.millimetres),),
+        (block.quantity(ball.radius, unit or snapshot.design.millimetres),),
         f"to δ{ball.incidence} = 0",
         hint,
     )
@@ -296,7 +296,7 @@ def regular_distance(motion: float, unit: Unit) -> block.Fact:
     """Return the motion within which no pose is singular."""
     return block.Fact(
         "regular within",
-        (block.measured(motion, unit),),
+        (block.quantity(motion, unit),),
         "of motion",
         "No pose is singular whose b1 to b4 are displaced by less, root mean square",
     )
