@@ -40,11 +40,7 @@ def kernel_files(design: Design) -> dict[str, bytes]:
     """Return header and source of the kernel of a design, by the names of the files."""
     unit, pose = design.unit_mm, design.home_pose
     rows, axes, words = limit_rows(design)
-    radii = unit * Rules.of(design).row[quantities.RADII :]
-    words += [
-        "no limit: they share a joint" if sum_mm < 0.0 else f"more than {format_number(sum_mm)}"
-        for sum_mm in radii.tolist()
-    ]
+    radii, pair_words = pair_rows(design)
     variables = [unit * value for value in design.variables]
     fields = {
         **dict(zip(VARIABLES, map(_number, variables), strict=True)),
@@ -61,8 +57,8 @@ def kernel_files(design: Design) -> dict[str, bytes]:
         "axes": _table(axes),
         "radii": _numbers(radii),
         "bits": "\n".join(
-            f"    F44_{name} = 1u << {bit}, /* {text} */"
-            for bit, (name, text) in enumerate(zip(LIMIT_NAMES, words, strict=True))
+            f"    F44_{name} = 1u << {bit}, /* {text or 'no limit'} */"
+            for bit, (name, text) in enumerate(zip(LIMIT_NAMES, words + pair_words, strict=True))
         ),
     }
     return {
@@ -81,12 +77,12 @@ def limit_rows(design: Design) -> tuple[FloatArray, FloatArray, list[str]]:
 
     The ranges are in millimetres and radians, widened by the tolerance, infinite without a limit.
     They are in the order of `LIMIT_NAMES` without the pairs of legs. The axes are unit vectors in
-    the base (a1, a3) or on the platform (b1 to b4), zero if there is no limit.
+    the base (a1, a3) or on the platform (b1 to b4). Axes are zero and words empty without a limit.
     """
     swings = Swing.__struct_fields__
     count = quantities.ANGLE + len(swings)
     ranges = np.tile([-math.inf, math.inf], (count, 1))
-    axes, words = np.zeros((len(swings), 3)), ["no limit"] * count
+    axes, words = np.zeros((len(swings), 3)), [""] * count
     for demand in demands_of(design):
         row, index, unit = np.array(demand.row(design)), demand.quantity, design.unit_mm
         if demand.angle is not None:
@@ -96,6 +92,23 @@ def limit_rows(design: Design) -> tuple[FloatArray, FloatArray, list[str]]:
         ranges[index] = unit * row[[quantities.LOW, quantities.HIGH]]
         words[index] = demand.words(design.unit_mm)
     return ranges, axes, words
+
+
+def pair_rows(design: Design) -> tuple[FloatArray, list[str]]:
+    """Return the least distances of the axes of pairs of legs, shape (6,), in mm, and their words.
+
+    A pair that shares a joint may touch: its distance is negative and its words are empty.
+    """
+    distances = design.unit_mm * Rules.of(design).row[quantities.RADII :]
+    words = [
+        ""
+        if least < 0.0
+        else f"more than {format_number(least)} apart"
+        if least
+        else "do not touch"
+        for least in distances.tolist()
+    ]
+    return distances, words
 
 
 def _number(value: float) -> str:

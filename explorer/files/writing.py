@@ -90,8 +90,8 @@ def read_at_most(path: Path, largest: int) -> bytes:
     return data
 
 
-def make_folder(path: Path) -> None:
-    """Make a folder, and missing ones above it, accessible to its owner alone.
+def make_folder(path: Path, mode: int = 0o700) -> None:
+    """Make a folder, and missing ones above it, by default accessible to its owner alone.
 
     A folder that exists is left unchanged.
 
@@ -99,7 +99,7 @@ def make_folder(path: Path) -> None:
         StorageError: The folder cannot be made.
     """
     with _storage_errors("make the folder", path):
-        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path.mkdir(mode, parents=True, exist_ok=True)
 
 
 def move(source: Path, target: Path) -> None:

@@ -15,7 +15,9 @@ from command_line import CommandLine
 
 import explorer
 from explorer.cli import run
+from explorer.export.controller import kernel_files
 from explorer.export.mesh import FORMATS
+from explorer.export.moving_page import moving_page
 from explorer.export.simulation import simulation_mjcf
 from explorer.mechanism.design_file import STIFFNESSES
 from explorer.mechanism.machine import Actuators, Payload
@@ -166,6 +168,19 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     text = cli.text(*words)
     for line in ("seed 7", "tool at home off by", f"weights move the tool by {moved:.3g} mm and "):
         assert line in text
+
+
+def test_export_kernel_writes_a_folder_and_page_a_file(cli: CommandLine, tmp_path: Path) -> None:
+    folder, page = tmp_path / "new" / "kernel", tmp_path / "page.html"
+    for _ in range(2):
+        answer = cli.answer("kernel", "--out", folder)
+        names = ["flagged44.h", "flagged44.c"]
+        assert answer == {"file": str(folder), "format": "c", "files": names}
+        assert {each.name: each.read_bytes() for each in folder.iterdir()} == kernel_files(OPTIMAL)
+    assert cli.answer("page", "--out", page)["bytes"] == len(page.read_bytes())
+    assert page.read_bytes() == moving_page(OPTIMAL)
+    assert "there is c" in cli.refusal("kernel", "--out", folder, "--format", "zip")
+    assert "folder" in cli.refusal("kernel", "--out", page)
 
 
 @pytest.mark.parametrize(("name", "expected"), [("a.3mf", "3mf"), ("a.zip", "stl-zip")])

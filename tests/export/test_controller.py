@@ -11,17 +11,15 @@ import msgspec
 import numpy as np
 import pytest
 from compiled_kernel import COMPILER, SANITIZED, CompiledKernel, compile_c
-from limited_designs import ordinary_case, scaled_design
+from exported_designs import in_mm, limited_design, poses_about_home, random_poses, size_of
 from long_cases import long_after
 from numpy.testing import assert_allclose, assert_array_equal
 from reference import read_reference
-from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, forward, from_folds, inverse, jacobian, margins, to_folds
+from explorer import PRESETS, Design, forward, inverse, jacobian, margins, to_folds
 from explorer.export.controller import LIMIT_NAMES, kernel_files
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Swing
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.workspace.limits.valid_poses import poses_are_valid, violations
@@ -48,44 +46,6 @@ def _defined(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:  # pyright: i
     """Let the sanitizer find no undefined behaviour."""
     yield
     assert capfd.readouterr().err == ""
-
-
-def limited_design(seed: int) -> Design:
-    """Return a design in its own unit with every kind of limit, and its home within them."""
-    design, _ = ordinary_case(seed)
-    angles = np.random.default_rng(seed).uniform(30.0, 150.0, 6).tolist()
-    swing = Swing(**dict(zip(Swing.__struct_fields__, angles, strict=True)))
-    design = design.with_limits(swing=swing, leg_radii=(0.1, 0.2, 0.3, 0.05), gap=0.5)
-    return msgspec.structs.replace(design, unit_mm=7.3)
-
-
-def in_mm(design: Design) -> Design:
-    """Return a design with its lengths in millimetres."""
-    return msgspec.structs.replace(scaled_design(design, design.unit_mm), unit_mm=1.0)
-
-
-def size_of(design: Design) -> float:
-    return max(map(abs, design.variables))
-
-
-def random_poses(design: Design, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return poses of all modes, half of them with folds within 1e-2 to 1e-14 of flat."""
-    rng = np.random.default_rng(seed)
-    folds = rng.uniform(-np.pi, np.pi, (count, 6))
-    folds[:, 0] = 2.0 * size_of(design) * rng.uniform(0.01, 1.0, count)
-    folds[:, 1:3] = np.abs(folds[:, 1:3])
-    half = count // 2
-    flat = np.pi * rng.integers(0, 2, (half, 5)) + 10.0 ** rng.uniform(-14, -2, (half, 5))
-    folds[:half, 1:] = np.where(rng.random((half, 5)) < 0.4, flat, folds[:half, 1:])
-    return from_folds(folds)
-
-
-def poses_about_home(design: Design, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    rng = np.random.default_rng(seed)
-    home, steps = design.home_pose, rng.uniform(0.0, 0.5, (count, 1))
-    positions = np.array(home.position) + steps * size_of(design) * rng.normal(size=(count, 3))
-    turns = Rotation.from_rotvec(steps * rng.normal(size=(count, 3))).as_matrix()
-    return positions, turns @ home.rotation
 
 
 # Twenty designs of 50,000 vectors each are a million.

@@ -1,4 +1,4 @@
-"""`explorer export`: the workspace, the mechanism, its simulation or the scene as a file."""
+"""`explorer export`: the workspace, the mechanism, its models or pages as files."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ import tyro
 from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import assembly, mesh, simulation, step
+from explorer.export.controller import kernel_files
+from explorer.export.moving_page import moving_page
 from explorer.files.extras import check_extra
-from explorer.files.writing import check_writable, write_whole
+from explorer.files.writing import check_writable, make_folder, write_whole
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
@@ -27,7 +29,7 @@ from explorer.statics import accuracy
 from explorer.workspace.solids.solid import convex_hull
 from explorer.workspace.solids.solids import workspace_solid
 
-What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
+What = Literal["workspace", "hull", "mechanism", "simulation", "scene", "page", "kernel"]
 
 # Typical width of a browser window over its height.
 ASPECT = 1.6
@@ -36,28 +38,29 @@ OF_ALL = ("what", "out", "format", "design", "json")
 
 @dataclass(frozen=True, kw_only=True)
 class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
-    """Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.
+    """Write the workspace as a mesh, the mechanism as parts, model, page or kernel, or the scene.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
     `stl-zip` a part is a file of its own. The simulation is an MJCF model in metres, to include in
     a scene: every joint, closed loops, payload, tool, six servos within the limits of their forces;
     with `--errors` the machine deviates from its design. The scene is one HTML file for any
-    browser, in the home pose unless a pose is given. With `--at tool` the
-    workspace and the hull are those of the tool point, with `--load` those of the positions that
-    hold the load.
+    browser, in the home pose unless a pose is given; the page is a smaller one whose mechanism
+    moves, with sliders for pose, joints and folds. The kernel is a folder with the kinematics of
+    the design as C99 source, for controllers. With `--at tool` the workspace and the hull are those
+    of the tool point, with `--load` those of the positions that hold the load.
     """
 
     what: Annotated[What, tyro.conf.Positional]
     """Object to write."""
 
     out: Path
-    """File to write; an existing one is replaced."""
+    """File to write, of a kernel the folder; an existing one is replaced."""
 
     format: Annotated[
         str | None,
         values.hint(
-            "default: the suffix of the file", "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html"
+            "default: the suffix of the file", "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html|c"
         ),
     ] = None
     """Format; 3mf has unit, names, colours, ply and obj doubles, step (extra `cad`) exact faces."""
@@ -89,16 +92,22 @@ class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
 
     def run(self) -> None:
         """Write the file, and its measures to standard output."""
-        file_format = self.format or self.out.suffix.lower().removeprefix(".")
+        file_format = self.format or _FOLDERS.get(self.what) or self.out.suffix.lower()[1:]
         if not file_format:
             raise InputError(
                 f"--out {str(self.out)!r} has no suffix that names the format: give --format"
             )
-        check_writable(self.out)
         write, options = _WRITERS[self.what]
         self.refuse_all_but(*options)
+        if self.what not in _FOLDERS:
+            check_writable(self.out)
         data, facts = write(self, file_format)
-        write_whole(self.out, data)
+        if isinstance(data, bytes):
+            write_whole(self.out, data)
+        else:
+            make_folder(self.out, 0o777)
+            for name, each in data.items():
+                write_whole(self.out / name, each)
         self.write(lambda: {"file": self.out, **facts}, (str(self.out), *_as_lines(facts)))
 
     def refuse_all_but(self, *names: str) -> None:
@@ -109,6 +118,8 @@ class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
 
 
 Facts = dict[str, Any]
+Data = bytes | dict[str, bytes]
+"""The contents of a file, or of a folder's files by their names."""
 
 
 def _as_lines(facts: Facts) -> Iterator[str]:
@@ -237,13 +248,31 @@ def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
     return data, {"format": "html", "bytes": len(data)}
 
 
+def _page(command: Export, file_format: str) -> tuple[bytes, Facts]:
+    if file_format not in ("html", "htm"):
+        raise InputError(f"no format {file_format!r} of the page; there is html")
+    data = moving_page(command.read_design())
+    return data, {"format": "html", "bytes": len(data)}
+
+
+def _kernel(command: Export, file_format: str) -> tuple[dict[str, bytes], Facts]:
+    if file_format != "c":
+        raise InputError(f"no format {file_format!r} of the kernel; there is c")
+    files = kernel_files(command.read_design())
+    return files, {"format": "c", "files": list(files)}
+
+
 _ORIENTATION = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
-_WRITERS: dict[What, tuple[Callable[[Export, str], tuple[bytes, Facts]], tuple[str, ...]]] = {
+_FOLDERS = {"kernel": "c"}
+"""The format of each object that is a folder of files."""
+_WRITERS: dict[What, tuple[Callable[[Export, str], tuple[Data, Facts]], tuple[str, ...]]] = {
     "workspace": (_mesh, ("tolerance", "load", *_ORIENTATION)),
     "hull": (_mesh, ("tolerance", "load", *_ORIENTATION)),
     "mechanism": (_mechanism, ("density",)),
     "simulation": (_simulation, ("density", "masses", "errors", "typical")),
     "scene": (_scene, ("position", "folds", *_ORIENTATION)),
+    "page": (_page, ()),
+    "kernel": (_kernel, ()),
 }
 """The function that writes each object, and its options besides those of all."""
 

@@ -1,0 +1,119 @@
+"""The moving page: one HTML file in which the mechanism of a design moves, without network.
+
+The templates hold its look and its scripts. What is filled in here are the numbers of the design,
+in millimetres and radians, its limits and their words.
+"""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from string import Template
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from explorer import __version__
+from explorer.export.controller import limit_rows, pair_rows, read_template
+from explorer.legs.clearance import PAIRS, pair_name
+from explorer.mechanism.design import JOINTS, LENGTHS, Design, Swing
+from explorer.mechanism.feasible_intervals import possible_ranges
+from explorer.singularity import colours
+
+# The names of the limited quantities, in the order of `explorer.export.controller.limit_rows`.
+NAMES = (
+    *("x of b4", "y of b4", "z of b4", "δ1", "δ2", "δ3", "d1", "d3", "|d1 − d3|", "d3 − d1"),
+    *LENGTHS,
+    *(f"Swing at {joint}" for joint in Swing.__struct_fields__),
+)
+# The indices of those quantities that demand a sign, and the legs of lengths and swings.
+SIGNS = (3, 4, 5, 9)
+LEGS = {10: 0, 11: 1, 12: 2, 13: 3, 14: 0, 15: 3, 16: 0, 17: 1, 18: 2, 19: 3}
+# Share of its range by which a slider goes on beyond either end.
+BEYOND = 0.1
+# Colours of the bodies, as in the scene of the explorer's own page.
+BODIES = {
+    "tube": (84, 96, 114),
+    "rod": (188, 197, 209),
+    "joint": (52, 60, 72),
+    "ball": (232, 235, 240),
+    "base": (214, 219, 226),
+    "platform": (150, 160, 176),
+    "rail": (128, 138, 152),
+    "carriage": (104, 115, 132),
+    "leaves": ((176, 156, 112), (96, 140, 136)),
+}
+
+
+def moving_page(design: Design) -> bytes:
+    """Return the page of a design as HTML."""
+    # No text of a design ends the script that it stands in.
+    data = msgspec.json.encode(page_data(design)).decode().replace("<", "\\u003c")
+    scripts = [read_template(f"{name}.js") for name in ("kinematics", "scene", "controls")]
+    fields = {
+        "title": f"{escape(design.name)} – flagged 4-4 manipulator",
+        "name": escape(design.name),
+        "style": read_template("moving_page.css"),
+        "script": "".join([*scripts, f"window.page = window.startPage({data});"]),
+        "origin": f"Lengths in mm. Written by flagged-explorer {__version__}.",
+    }
+    return Template(read_template("moving_page.html")).substitute(fields).encode()
+
+
+def page_data(design: Design) -> dict[str, Any]:
+    """Return what the page's scripts take of a design, as values of JSON."""
+    unit, home, possible = design.unit_mm, design.home_pose, possible_ranges(design)
+    ranges, axes, words = limit_rows(design)
+    radii, pair_words = pair_rows(design)
+    spans = dict(zip((*JOINTS, *"xyz"), (*possible.joints, *possible.position), strict=True))
+    farthest = math.hypot(*(max(map(abs, span)) for span in possible.position))
+    a3, b1 = design.a3, design.b1
+    return {
+        "a3": [unit * a3[0], unit * a3[1]],
+        "b1": [unit * b1[0], unit * b1[1]],
+        "b2": unit * design.b2,
+        "b3": unit * design.b3,
+        "a2x": unit * design.a2x,
+        "reach": unit * design.reach,
+        "warn": colours.WARN_SHARE * unit * design.reach,
+        "leg_radii": [unit * radius for radius in design.limits.leg_radii],
+        "home": {
+            "position": (unit * np.array(home.position)).tolist(),
+            "rotation": home.rotation.ravel().tolist(),
+        },
+        # JSON has no infinity: null is no bound.
+        "limits": [
+            {
+                "name": name,
+                "low": low if math.isfinite(low) else None,
+                "high": high if math.isfinite(high) else None,
+                "words": text,
+                "unit": "°" if index >= 14 else "mm",
+                "sign": index in SIGNS,
+                "leg": LEGS.get(index),
+            }
+            for index, (name, (low, high), text) in enumerate(
+                zip(NAMES, ranges.tolist(), words, strict=True)
+            )
+        ],
+        "clearances": [
+            {"name": f"Legs {pair_name(pair)}", "words": text}
+            for pair, text in zip(PAIRS, pair_words, strict=True)
+        ],
+        "axes": axes.tolist(),
+        "radii": radii.tolist(),
+        "spans": {
+            name: [unit * (low - BEYOND * (high - low)), unit * (high + BEYOND * (high - low))]
+            for name, (low, high) in {**spans, "r": (0.0, farthest)}.items()
+        },
+        "colours": {
+            **BODIES,
+            "singular": colours.SINGULAR,
+            "warned": colours.WARNED,
+            "clear": colours.CLEAR,
+            "far": colours.FAR,
+            "alarm": colours.OUTLINE,
+            "margins": colours.MARGIN_COLOURS,
+        },
+    }

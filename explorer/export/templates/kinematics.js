@@ -1,0 +1,170 @@
+// Kinematics of one design of the flagged 4-4 manipulator, in millimetres and radians. A pose is
+// { position: [x, y, z], rotation: nine numbers row by row }, of b4 and from platform to base.
+// Joints are (l1, d1, d2, d3, d4, l4), folds (r, β, ε, φ1, φ2, φ3).
+window.flagged44 = (design) => {
+  const [a3x, a3y] = design.a3;
+  const [b1x, b1y] = design.b1;
+  const { b2, b3 } = design;
+  const size = Math.max(...[a3x, a3y, b1x, b1y, b2, b3].map(Math.abs));
+  const pairs = [0, 1, 2].flatMap((i) => [1, 2, 3].filter((j) => j > i).map((j) => [i, j]));
+
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const along = (a, share, b) => a.map((value, i) => value + share * b[i]);
+  const minus = (a, b) => along(a, -1, b);
+  const length = (a) => Math.sqrt(dot(a, a));
+  const cross = (a, b) => [
+    a[1] * b[2] - a[2] * b[1],
+    a[2] * b[0] - a[0] * b[2],
+    a[0] * b[1] - a[1] * b[0],
+  ];
+  const column = (rotation, j) => [rotation[j], rotation[3 + j], rotation[6 + j]];
+  const turn = (rotation, a) => [0, 3, 6].map((row) => dot(rotation.slice(row, row + 3), a));
+  const place = ({ position, rotation }, point) => along(turn(rotation, point), 1, position);
+
+  // The ends of the four legs: a1, the carriages and a3 below, b1, b2, b3 and b4 above.
+  const legs = (pose) => {
+    const [x, y] = [column(pose.rotation, 0), column(pose.rotation, 1)];
+    const tip1 = along(along(pose.position, b1x, x), b1y, y);
+    const tip2 = along(pose.position, b2, x);
+    const tip3 = along(pose.position, b3, x);
+    const feet = [
+      [0, 0, 0],
+      [tip2[0], 0, 0],
+      [tip3[0], 0, 0],
+      [a3x, a3y, 0],
+    ];
+    return feet.map((foot, i) => ({ foot, tip: [tip1, tip2, tip3, pose.position][i] }));
+  };
+
+  const inverse = (pose) => {
+    const ends = legs(pose);
+    const [l1, d2, d4, l4] = ends.map(({ foot, tip }) => length(minus(tip, foot)));
+    return [l1, ends[1].foot[0], d2, ends[2].foot[0], d4, l4];
+  };
+
+  const margins = ({ position: p, rotation: r }) => [
+    -dot(column(r, 2), p),
+    r[3] * p[2] - r[6] * p[1],
+    p[2],
+  ];
+
+  // p = X(φ3) Z(β) (r, 0, 0) and R = X(φ3) Z(β) X(−φ2) Z(ε) X(−φ1).
+  const fromFolds = ([r, ...angles]) => {
+    const [cb, ce, c1, c2, c3] = angles.map(Math.cos);
+    const [sb, se, s1, s2, s3] = angles.map(Math.sin);
+    const columns = [
+      [ce, se * c2, -se * s2],
+      [-se * c1, ce * c1 * c2 - s1 * s2, -ce * c1 * s2 - s1 * c2],
+      [-se * s1, ce * s1 * c2 + c1 * s2, c1 * c2 - ce * s1 * s2],
+    ].map(([x, y, z]) => {
+      const [u, v] = [cb * x - sb * y, sb * x + cb * y];
+      return [u, c3 * v - s3 * z, s3 * v + c3 * z];
+    });
+    const rotation = [0, 1, 2].flatMap((row) => columns.map((each) => each[row]));
+    return { position: [r * cb, r * sb * c3, r * sb * s3], rotation };
+  };
+
+  const toFolds = ({ position, rotation }) => {
+    // A negative zero would turn a fold of π into −π.
+    const [px, py, pz] = [position[0], position[1], position[2] + 0];
+    const h = Math.sqrt(py * py + pz * pz);
+    const r = Math.sqrt(px * px + h * h);
+    const [c3, s3] = h > 0 ? [py / h, pz / h] : [1, 0];
+    const [cb, sb] = r > 0 ? [px / r, h / r] : [1, 0];
+    // The platform's axes, turned back by X(φ3) Z(β).
+    const [u, v, n] = [0, 1, 2].map((j) => {
+      const [x, y, z] = column(rotation, j);
+      const level = c3 * y + s3 * z;
+      return [cb * x + sb * level, cb * level - sb * x, c3 * z - s3 * y];
+    });
+    const se = Math.sqrt(u[1] * u[1] + u[2] * u[2]);
+    const [c2, s2] = se > 0 ? [u[1] / se, (0 - u[2]) / se] : [1, 0];
+    const phi1 = Math.atan2(0 - (s2 * v[1] + c2 * v[2]), s2 * n[1] + c2 * n[2]);
+    const beta = Math.atan2(sb, cb);
+    return [r, beta, Math.atan2(se, u[0]), phi1, Math.atan2(s2, c2), Math.atan2(s3, c3)];
+  };
+
+  // The folds of joints, with φ1, φ2 and φ3 from 0 to π: their signs are those of the mode. Null
+  // if the joints do not close. The three discriminants are the squared margins.
+  const forward = ([l1, d1, d2, d3, d4, l4]) => {
+    const span = b3 - b2;
+    const c = (d3 - d1) / span;
+    const sine2 = (1 - c) * (1 + c);
+    const px = d1 - b2 * c;
+    const t = -b2 / span;
+    const h2 = (1 - t) * d2 * d2 + t * d4 * d4 - t * (1 - t) * span * span * sine2;
+    const lean = (d4 * d4 - d2 * d2 - (b3 + b2) * span * sine2) / (2 * span);
+    const r2 = px * px + h2;
+    const u = c * px + lean;
+    const py = ((px - a3x) * (px - a3x) + h2 + a3y * a3y - l4 * l4) / (2 * a3y);
+    const v = (l1 * l1 - r2 - b1x * b1x - b1y * b1y - 2 * b1x * u) / (2 * b1y);
+    const squares = [r2 - u * u - v * v, sine2 * h2 - lean * lean, h2 - py * py];
+    const rounding = 1e-13 * (size * size + d2 * d2 + d4 * d4 + l1 * l1 + l4 * l4 + px * px);
+    const least = Math.min(...squares, h2, size * size * sine2);
+    if (!(least >= -rounding && Math.min(l1, d2, d4, l4) >= 0)) return null;
+    const [delta1, delta2, delta3, h, g] = [...squares, h2, r2 - u * u].map((square) =>
+      Math.sqrt(Math.max(0, square)),
+    );
+    const r = Math.sqrt(px * px + h * h);
+    const phi2 = Math.atan2(r * delta2, lean * px - c * h * h);
+    const [phi1, phi3] = [Math.atan2(delta1, -v), Math.atan2(delta3, py)];
+    return [r, Math.atan2(h, px), Math.atan2(g, u), phi1, phi2, phi3];
+  };
+
+  // Bit 2 is set if δ1 is positive, bit 1 if δ2 is, bit 0 if δ3 is.
+  const modeOf = (signs) => signs.reduce((mode, sign) => 2 * mode + (sign > 0 ? 1 : 0), 0);
+  const signsOf = (mode) => [4, 2, 1].map((bit) => (mode & bit ? 1 : -1));
+
+  // The distance of the axes of two legs.
+  const distance = (first, second) => {
+    const [u, v] = [first, second].map(({ foot, tip }) => minus(tip, foot));
+    const w = minus(first.foot, second.foot);
+    const share = (value, over) => (value <= 0 || over <= 0 ? 0 : Math.min(1, value / over));
+    const [uu, vv, uv, ur, vr] = [dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)];
+    const ends = [
+      [0, share(vr, vv)],
+      [1, share(uv + vr, vv)],
+      [share(-ur, uu), 0],
+      [share(uv - ur, uu), 1],
+    ];
+    const n = cross(u, v);
+    const [nn, s, t] = [dot(n, n), dot(n, cross(v, w)), dot(n, cross(u, w))];
+    if (s > 0 && s < nn && t > 0 && t < nn) ends.push([s / nn, share((uv * s) / nn + vr, vv)]);
+    return Math.min(...ends.map(([p, q]) => length(along(along(w, p, u), -q, v))));
+  };
+
+  // The quantities that limits bound, in the order of `design.limits`: b4, the margins, d1, d3,
+  // |d1 − d3|, d3 − d1, l1, d2, d4, l4, and the angles of legs from home at a1, a3, b1 to b4.
+  const quantities = (pose) => {
+    const [l1, d1, d2, d3, d4, l4] = inverse(pose);
+    const ends = legs(pose);
+    const swings = [0, 3, 0, 1, 2, 3].map((leg, k) => {
+      const axis = k < 2 ? design.axes[k] : turn(pose.rotation, design.axes[k]);
+      const arm = minus(ends[leg].tip, ends[leg].foot);
+      return Math.atan2(length(cross(arm, axis)), dot(arm, axis));
+    });
+    const joints = [d1, d3, Math.abs(d3 - d1), d3 - d1, l1, d2, d4, l4];
+    return [...pose.position, ...margins(pose), ...joints, ...swings];
+  };
+
+  // The broken limits of a pose: { index, value, above } of quantities, and the pairs of legs that
+  // collide.
+  const broken = (pose) => {
+    const limits = [];
+    quantities(pose).forEach((value, index) => {
+      const { low, high } = design.limits[index];
+      const [least, most] = [low ?? -Infinity, high ?? Infinity];
+      if (!(least <= value && value <= most)) limits.push({ index, value, above: value > most });
+    });
+    const ends = legs(pose);
+    const collisions = pairs.filter(
+      ([i, j], k) => design.radii[k] >= 0 && !(distance(ends[i], ends[j]) > design.radii[k]),
+    );
+    return { limits, collisions };
+  };
+
+  const vectors = { dot, along, minus, length, cross, column, turn };
+  const modes = { modeOf, signsOf, pairs };
+  const poses = { place, legs, inverse, margins, fromFolds, toFolds, forward, quantities, broken };
+  return { ...vectors, ...modes, ...poses };
+};

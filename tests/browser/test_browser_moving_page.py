@@ -1,0 +1,191 @@
+"""The moving page: its numbers are Python's, it needs nothing but its file, and it can be used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from exported_designs import in_mm, limited_design, poses_about_home, random_poses, size_of
+from numpy.testing import assert_allclose
+from playwright.sync_api import Browser, Page, expect
+
+from explorer import PRESETS, Design, forward, from_folds, inverse, margins, to_folds
+from explorer.export.moving_page import NAMES, moving_page
+from explorer.legs.clearance import leg_clearances
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.margins import mode_of
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.valid_poses import violations
+
+OPTIMAL = PRESETS["paper-optimal"]
+SHARE, COUNT = 1e-12, 500
+LARGEST = 300_000
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """A page without network in which nothing fails, that moves at once."""
+    context = browser.new_context(
+        viewport={"width": 1440, "height": 900}, reduced_motion="reduce", offline=True
+    )
+    page, faults, requests = context.new_page(), list[str](), list[str]()
+    page.on("console", lambda message: faults.append(message.text))
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    yield page
+    context.close()
+    assert faults == []
+    assert all(url.startswith(("file:", "data:")) for url in requests)
+
+
+def open_page(page: Page, design: Design, folder: Path) -> None:
+    """Write the page of a design and open it from the disk."""
+    data = moving_page(design)
+    assert len(data) <= LARGEST
+    (folder / "page.html").write_bytes(data)
+    page.goto((folder / "page.html").as_uri())
+
+
+def call(page: Page, function: str, rows: FloatArray) -> Any:
+    """Return the results of a JavaScript function of `m`, the mechanism, and a row."""
+    return page.evaluate(f"rows => {{ const m = window.page; return rows.map({function}); }}", rows)
+
+
+def limits_in_python(design: Design, position: FloatArray, rotation: FloatArray) -> list[set[str]]:
+    """Return what each pose breaks, in the words of the page."""
+    words = {f"margin δ{k}": f"δ{k}" for k in (1, 2, 3)} | {f"box {x}": f"{x} of b4" for x in "xyz"}
+    words |= {"gap |d1 − d3|": "|d1 − d3|", "carriage order": "d3 − d1"}
+    at = Configuration(design, position, rotation)
+    return [
+        {words.get(each.limit, each.limit.replace("swing", "Swing at")) for each in broken}
+        | ({"collision"} if (clearances <= 0.0).any() else set())
+        for broken, clearances in zip(violations(at), leg_clearances(at).clearance, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_moving_page_has_the_numbers_of_python(page: Page, tmp_path: Path, seed: int) -> None:
+    design = limited_design(seed)
+    open_page(page, design, tmp_path)
+    design = in_mm(design)
+    size = size_of(design)
+    position, rotation = random_poses(design, COUNT, seed)
+    rows = np.concatenate([position, rotation.reshape(-1, 9)], axis=1).tolist()
+    pose = "({ position: row.slice(0, 3), rotation: row.slice(3) })"
+    for function, expected, error in (
+        ("inverse", inverse(design, position, rotation), SHARE * size),
+        ("margins", margins(position, rotation), SHARE * size),
+        ("toFolds", to_folds(position, rotation), SHARE * np.array([size, 1, 1, 1, 1, 1])),
+    ):
+        found = np.array(call(page, f"row => m.{function}({pose})", rows))
+        assert (np.abs(found - expected) <= error).all()
+
+    folds = to_folds(position, rotation)
+    poses = call(page, "row => m.fromFolds(row)", folds.tolist())
+    positions, rotations = from_folds(folds)
+    assert_allclose([each["position"] for each in poses], positions, rtol=0, atol=SHARE * size)
+    turns = np.reshape([each["rotation"] for each in poses], (-1, 3, 3))
+    assert_allclose(turns, rotations, rtol=0, atol=SHARE)
+
+    position, rotation = poses_about_home(design, COUNT, seed)
+    rows = np.concatenate([position, rotation.reshape(-1, 9)], axis=1).tolist()
+    names = f"({{ limits, collisions }}) => [...limits.map(({{ index }}) => {list(NAMES)}[index])"
+    names += ", ...(collisions.length ? ['collision'] : [])]"
+    broken = call(page, f"row => ({names})(m.broken({pose}))", rows)
+    assert [set(each) for each in broken] == limits_in_python(design, position, rotation)
+
+
+@pytest.mark.parametrize("design", [OPTIMAL, PRESETS["paper-initial"]])
+def test_moving_page_finds_the_modes_of_python(page: Page, tmp_path: Path, design: Design) -> None:
+    open_page(page, design, tmp_path)
+    design = in_mm(design)
+    size, rng = size_of(design), np.random.default_rng(1)
+    # Folds off the walls, where no cosine is a square root of rounding.
+    folds = rng.uniform(0.5, np.pi - 0.5, (COUNT, 6))
+    folds[:, 0] *= 0.2 * size
+    position, rotation = from_folds(folds)
+    joints = inverse(design, position, rotation)
+    joints[::3] *= rng.uniform(0.5, 1.5, (len(joints[::3]), 6))
+    positions, rotations, feasible = forward(design, joints)
+    found = call(page, "row => m.forward(row)", joints.tolist())
+    assert [each is not None for each in found] == feasible.tolist()
+    closed = [each for each in found if each is not None]
+    flat = np.abs(margins(positions[:, 7], rotations[:, 7])).min(axis=1) < 0.05 * size
+    again = from_folds(closed)
+    near = flat[feasible]
+    assert near.mean() < 0.2
+    error = np.abs(again[0] - positions[feasible, 7]).max(axis=1)
+    assert error[~near].max() <= SHARE * size
+    error = np.abs(again[1] - rotations[feasible, 7]).max(axis=(1, 2))
+    assert error[~near].max() <= SHARE
+
+
+def test_moving_page_moves_by_fields_sliders_modes_and_keys(page: Page, tmp_path: Path) -> None:
+    name = "</script><b>*/ & “A”"
+    open_page(page, msgspec.structs.replace(OPTIMAL, name=name), tmp_path)
+    expect(page.locator("h1")).to_have_text(name)
+    expect(page.locator("#limits-brief")).to_have_text("kept")
+
+    # A value beyond a limit is taken, and the limit told.
+    page.get_by_label("x (mm)").fill("230")
+    page.keyboard.press("Enter")
+    expect(page.locator("#broken")).to_contain_text("x of b4 is 230.0 mm, above its maximum of 200")
+    page.locator("#home").click()
+    expect(page.locator("#broken")).to_have_text("All kept.")
+
+    # A leg goes as far as the loops close.
+    page.locator("#tabs").get_by_text("Leg lengths").click()
+    page.get_by_label("l1 (mm)").fill("900")
+    page.keyboard.press("Enter")
+    expect(page.locator("#message")).to_contain_text("l1 is at most")
+    expect(page.locator("#verdict")).to_have_text("Singular pose")
+    expect(page.get_by_label("l1 (mm)")).not_to_have_value("900")
+    page.locator("#home").click()
+
+    # Each mode has the same joints.
+    joints = inverse(in_mm(OPTIMAL), *state_of(page))
+    for mode in range(8):
+        page.get_by_role("button", name=f"mode {mode}").click()
+        expect(page.locator("#modes [aria-pressed=true]")).to_contain_text(f"mode {mode}")
+        position, rotation = state_of(page)
+        assert mode_of(margins(position, rotation)) == mode
+        assert_allclose(inverse(in_mm(OPTIMAL), position, rotation), joints, rtol=0, atol=1e-9)
+
+    page.locator("#tabs").get_by_text("Folds").click()
+    slider = page.locator("#sliders input[type=range]").nth(3)
+    slider.focus()
+    before = page.evaluate("window.page.state.folds[3]")
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate("window.page.state.folds[3]") < before
+
+
+def state_of(page: Page) -> tuple[FloatArray, FloatArray]:
+    pose = page.evaluate("window.page.state.pose")
+    return np.array(pose["position"]), np.reshape(pose["rotation"], (3, 3))
+
+
+@pytest.mark.draws
+def test_moving_page_draws_and_turns_and_fits_a_telephone(page: Page, tmp_path: Path) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    open_page(page, OPTIMAL, tmp_path)
+    canvas = page.locator("#canvas")
+    expect(page.locator("#labels span").first).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    pictures = [canvas.screenshot()]
+    for key in ("ArrowLeft", "+", "f"):
+        canvas.press(key)
+        pictures.append(canvas.screenshot())
+    box = canvas.bounding_box()
+    assert box
+    page.mouse.move(box["x"] + 50, box["y"] + 50)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 150, box["y"] + 90)
+    page.mouse.up()
+    pictures.append(canvas.screenshot())
+    page.mouse.wheel(0, 200)
+    pictures.append(canvas.screenshot())
+    assert len(set(pictures)) == len(pictures)
