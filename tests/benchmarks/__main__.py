@@ -20,6 +20,7 @@ sys.path[:1] = [str(folder) for folder in (TESTS, TESTS / "support", TESTS.paren
 
 BENCHMARKS: Mapping[str, str] = {
     "forward": "the forward kinematics and the folds: a batch on one core, and one call",
+    "controller": "the kernel in C, beside Newton on the six lengths of a hexapod",
     "workspace": "exact volume, solid, and the region that holds a load",
     "slider": "from the arrival of a slider's event to the last message of the scene",
     "interference": "overlap of tetrahedra, clearances of the legs, moves, accessible workspace",
