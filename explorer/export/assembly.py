@@ -8,13 +8,12 @@ in the frame of its body.
 
 from __future__ import annotations
 
-import io
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 from explorer.export import mesh, opencascade as cad
+from explorer.files.writing import zip_bytes
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE
 from explorer.prototype.shapes import forms_of
@@ -112,14 +111,14 @@ def _nodes(prototype: Prototype, metres: float) -> list[dict[str, Any]]:
 
 
 def _stl_zip(prototype: Prototype) -> bytes:
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for part in prototype.parts:
-            # Without a date equal parts give equal files.
-            entry = zipfile.ZipInfo(f"{part.name.replace(' ', '-')}.stl")
-            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-            archive.writestr(entry, mesh.mesh_bytes(part.solid, "stl", prototype.design, part.name))
-    return file.getvalue()
+    return zip_bytes(
+        {
+            f"{part.name.replace(' ', '-')}.stl": mesh.mesh_bytes(
+                part.solid, "stl", prototype.design, part.name
+            )
+            for part in prototype.parts
+        }
+    )
 
 
 def exact_parts(sizes: Sizes) -> dict[str, cad.ExactShape]:

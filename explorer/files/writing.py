@@ -1,4 +1,4 @@
-"""Atomic writing and moving of files, and the folders for them.
+"""Atomic writing and moving of files, the folders for them, and archives.
 
 A file is written to a scratch file in the same folder, forced to the disk and renamed in one
 step, and the folder's entry is forced to the disk too: a kill or a power failure at any moment
@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
 import sys
 import time
 import uuid
-from collections.abc import Generator
+import zipfile
+from collections.abc import Generator, Mapping
 from pathlib import Path
 
 from explorer.errors import StorageError
@@ -137,6 +139,18 @@ def _sync_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+
+def zip_bytes(files: Mapping[str, bytes]) -> bytes:
+    """Return a ZIP archive of files by their names; equal files give equal archives."""
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, each in files.items():
+            # An entry without a date.
+            entry = zipfile.ZipInfo(name)
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            archive.writestr(entry, each)
+    return data.getvalue()
 
 
 def storage_error(operation: str, path: Path, error: OSError) -> StorageError:

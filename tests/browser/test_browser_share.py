@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.server
 import threading
 import time
+import zipfile
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +23,8 @@ import explorer
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
 from explorer.app.state.actions import Set
 from explorer.app.state.view import View
+from explorer.export.controller import kernel_files
+from explorer.export.moving_page import moving_page
 from explorer.numerics.arrays import FloatArray
 
 untyped: Any = imageio.v3
@@ -105,6 +108,17 @@ def test_picture_has_the_size_and_background_that_are_set_and_no_handle(tab: Tab
     found = likeness(shown[height // 4 :], blocks(taken, 2)[height // 4 :])
     assert found.spot < PLAIN_TO_SEE
     assert found.structure < 0.05
+
+
+def test_moving_page_and_kernel_are_those_of_the_design(tab: Tab) -> None:
+    download = tab.export("Moving page", "HTML")
+    assert download.suggested_filename == "paper-optimal-moving.html"
+    assert download.path().read_bytes() == moving_page(tab.state.design)
+    download = tab.export("Kernel for controllers", "C")
+    assert download.suggested_filename == "paper-optimal-kernel.zip"
+    with zipfile.ZipFile(download.path()) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    assert files == kernel_files(tab.state.design)
 
 
 def test_scene_as_one_page_works_without_network_and_asks_for_nothing(

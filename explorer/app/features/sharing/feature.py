@@ -20,7 +20,10 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import extra_button, open_button, press_button
 from explorer.app.widgets.markup import box
+from explorer.export.controller import kernel_files
+from explorer.export.moving_page import moving_page
 from explorer.files.extras import is_missing
+from explorer.files.writing import zip_bytes
 
 PRESS = "export"
 PICTURES: dict[str, tuple[int, int] | float] = {
@@ -83,6 +86,19 @@ def send_report(services: Services, file_format: ReportFormat, who: Who) -> None
         (state.design, state.pose, Optimisation.of(state).record, file_format),
         ("Writing the report", "This takes some seconds."),
     )
+
+
+def send_page(services: Services, who: Who) -> None:
+    """Send the page in which the mechanism of the design moves."""
+    design = services.session.latest_state().design
+    services.downloads.send(who, f"{design.name}-moving.html", moving_page(design))
+
+
+def send_kernel(services: Services, who: Who) -> None:
+    """Send header and source of the kernel of the design as a ZIP archive."""
+    design = services.session.latest_state().design
+    data = zip_bytes(kernel_files(design))
+    services.downloads.send(who, f"{design.name}-kernel.zip", data)
 
 
 class ExportDialog:
@@ -187,6 +203,18 @@ SHARING = Feature(
             "One file to turn and zoom in any browser, without network.",
             ("HTML",),
             lambda services, _, who: send_scene(services, who),
+        ),
+        Export(
+            "Moving page",
+            "A small file with sliders in which the mechanism moves, for lessons and papers.",
+            ("HTML",),
+            lambda services, _, who: send_page(services, who),
+        ),
+        Export(
+            "Kernel for controllers",
+            "Kinematics and limits of the design as C99 source, in millimetres.",
+            ("C",),
+            lambda services, _, who: send_kernel(services, who),
         ),
     ),
 )
