@@ -19,17 +19,19 @@ from explorer.export.controller import limit_rows, pair_rows, read_template
 from explorer.legs.clearance import PAIRS, pair_name
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Swing
 from explorer.mechanism.feasible_intervals import possible_ranges
+from explorer.mechanism.margins import INCIDENCES
 from explorer.singularity import colours
+from explorer.workspace.limits import quantities
 
-# The names of the limited quantities, in the order of `explorer.export.controller.limit_rows`.
+# Of the limited quantities, in the order of `explorer.export.controller.limit_rows`: their names,
+# and the legs of lengths and swings, in the drawing.
 NAMES = (
     *("x of b4", "y of b4", "z of b4", "δ1", "δ2", "δ3", "d1", "d3", "|d1 − d3|", "d3 − d1"),
     *LENGTHS,
     *(f"Swing at {joint}" for joint in Swing.__struct_fields__),
 )
-# The indices of those quantities that demand a sign, and the legs of lengths and swings.
-SIGNS = (3, 4, 5, 9)
-LEGS = {10: 0, 11: 1, 12: 2, 13: 3, 14: 0, 15: 3, 16: 0, 17: 1, 18: 2, 19: 3}
+LEGS = (*[None] * quantities.L1, *(0, 1, 2, 3), *(0, 3, 0, 1, 2, 3))
+SIGNS = (quantities.DELTA1, quantities.DELTA2, quantities.DELTA3, quantities.ORDER)
 # Share of its range by which a slider goes on beyond either end.
 BEYOND = 0.1
 # Colours of the bodies, as in the scene of the explorer's own page.
@@ -89,9 +91,9 @@ def page_data(design: Design) -> dict[str, Any]:
                 "low": low if math.isfinite(low) else None,
                 "high": high if math.isfinite(high) else None,
                 "words": text,
-                "unit": "°" if index >= 14 else "mm",
+                "unit": "°" if index >= quantities.ANGLE else "mm",
                 "sign": index in SIGNS,
-                "leg": LEGS.get(index),
+                "leg": LEGS[index],
             }
             for index, (name, (low, high), text) in enumerate(
                 zip(NAMES, ranges.tolist(), words, strict=True)
@@ -101,11 +103,16 @@ def page_data(design: Design) -> dict[str, Any]:
             {"name": f"Legs {pair_name(pair)}", "words": text}
             for pair, text in zip(PAIRS, pair_words, strict=True)
         ],
+        "incidences": INCIDENCES,
         "axes": axes.tolist(),
         "radii": radii.tolist(),
         "spans": {
             name: [unit * (low - BEYOND * (high - low)), unit * (high + BEYOND * (high - low))]
-            for name, (low, high) in {**spans, "r": (0.0, farthest)}.items()
+            # Limits that contradict each other leave a range whose ends are reversed.
+            for name, (low, high) in {
+                **{name: sorted(span) for name, span in spans.items()},
+                "r": (0.0, farthest),
+            }.items()
         },
         "colours": {
             **BODIES,

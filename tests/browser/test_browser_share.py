@@ -114,7 +114,7 @@ def test_moving_page_and_kernel_are_those_of_the_design(tab: Tab) -> None:
     download = tab.export("Moving page", "HTML")
     assert download.suggested_filename == "paper-optimal-moving.html"
     assert download.path().read_bytes() == moving_page(tab.state.design)
-    download = tab.export("Kernel for controllers", "C")
+    download = tab.export("Kernel for controllers", "C (zip)")
     assert download.suggested_filename == "paper-optimal-kernel.zip"
     with zipfile.ZipFile(download.path()) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}

@@ -1,18 +1,18 @@
 // The page: its state is one pose; sliders, modes and keys move it, and all that is shown follows.
 window.startPage = (design) => {
   const mechanism = window.flagged44(design);
-  const { along, dot, column, turn, inverse, margins, forward, fromFolds, toFolds } = mechanism;
+  const { along, dot, column, inverse, margins, forward, fromFolds, toFolds } = mechanism;
   const find = (id) => document.getElementById(id);
   const DEGREE = Math.PI / 180;
   const { reach, colours } = design;
-  // A hundredth of the explorer's scene, in which the reach has a length of 20.
+  // The unit of sizes that are drawn; the reach has twenty.
   const u = reach / 20;
   const decimals = Math.max(0, Math.min(6, 4 - Math.ceil(Math.log10(reach))));
-  const MARGINS = [
-    { name: "δ1", fold: "φ1", words: "a1 on the platform plane" },
-    { name: "δ2", fold: "φ2", words: "lines a1a2 and b2b3 meeting" },
-    { name: "δ3", fold: "φ3", words: "b4 on the base plane" },
-  ];
+  const MARGINS = design.incidences.map((words, i) => ({
+    name: `δ${i + 1}`,
+    fold: `φ${i + 1}`,
+    words,
+  }));
   const TABS = {
     pose: ["x", "y", "z", "yaw", "pitch", "roll"],
     joints: ["l1", "d1", "d2", "d3", "d4", "l4"],
@@ -78,7 +78,11 @@ window.startPage = (design) => {
     const folds = tab === "folds" ? raw : forward(raw);
     if (!folds) return null;
     if (tab === "joints") state.signs.forEach((sign, i) => (folds[3 + i] *= sign));
-    return [fromFolds(folds), { folds }];
+    // Folds beyond their ranges have a pose, but that has other folds.
+    const [r, beta, epsilon, ...rest] = folds;
+    const largest = Math.max(beta, epsilon, ...rest.map(Math.abs));
+    const isProper = Math.min(r, beta, epsilon) >= 0 && largest <= Math.PI + 1e-12;
+    return [fromFolds(folds), isProper ? { folds } : {}];
   };
 
   const LEGEND = "Blue: all limits are kept while the other five values stay.";
@@ -86,9 +90,11 @@ window.startPage = (design) => {
     find("message").textContent = text;
   };
   // Change a value; joints go as far as the loops close.
-  const change = (tab, index, value) => {
+  const change = (tab, index, given) => {
     stop();
     say();
+    const most = HALF[TABS[tab][index]] ? 360 : 100 * reach;
+    const value = Math.max(-most, Math.min(most, given));
     let next = changed(tab, index, value);
     if (!next) {
       const name = TABS[tab][index];
@@ -259,7 +265,7 @@ window.startPage = (design) => {
       className: ok ? "within" : "beyond",
     });
     [...find("modes").children].forEach((button, mode) => {
-      button.ariaPressed = String(mode === mechanism.modeOf(state.signs));
+      button.setAttribute("aria-pressed", mode === mechanism.modeOf(state.signs));
     });
     return found;
   };
@@ -328,7 +334,7 @@ window.startPage = (design) => {
       ].map(place);
       scene.pane(corners, [...colour, 0.2]);
       corners.forEach((corner, k) => {
-        if (k > 0) scene.tube(corner, corners[(k + 1) % 4], 0.03 * u, colour);
+        if (k > 0) scene.line(corner, corners[(k + 1) % 4], 0.03 * u, colour);
       });
       return corners;
     };
@@ -345,10 +351,10 @@ window.startPage = (design) => {
     const count = Math.max(1, Math.round(mechanism.length(span) / (0.7 * u)));
     for (let k = 0; k < count; k += 1) {
       const [start, end] = [(k + 0.2) / count, (k + 0.8) / count];
-      scene.tube(along(from, start, span), along(from, end, span), 0.045 * u, colour);
+      scene.line(along(from, start, span), along(from, end, span), 0.045 * u, colour);
     }
   };
-  const drawMargins = (texts) => {
+  const drawMargins = () => {
     const { position, rotation } = state.pose;
     const [x, normal] = [column(rotation, 0), column(rotation, 2)];
     // The common perpendicular of the guide and the line b2b3.
@@ -365,12 +371,12 @@ window.startPage = (design) => {
       if (!(mechanism.length(middle) < 3 * reach)) return;
       dashes(from, to, colours.margins[i]);
       for (const end of [from, to]) scene.ball(end, 0.11 * u, colours.margins[i]);
-      texts.push({ text: MARGINS[i].name, at: middle, colour: css(colours.names[i]) });
+      texts.push({ text: MARGINS[i].name, at: middle, colour: css(colours.margins[i]) });
     });
   };
 
   // The inner leaves of the strip, and the folds as arcs at their hinges.
-  const drawFolds = (texts) => {
+  const drawFolds = () => {
     const { position: p, rotation } = state.pose;
     const [r, b, , f1, , f3] = state.folds;
     const [, high] = baseSpan();
@@ -385,7 +391,7 @@ window.startPage = (design) => {
       [p, [high, 0, 0]],
       [tip, a1],
     ])
-      scene.tube(from, to, 0.03 * u, colours.leaves[1]);
+      scene.line(from, to, 0.03 * u, colours.leaves[1]);
     const blend = (s, v, t, w) => v.map((value, i) => s * value + t * w[i]);
     const hinge = [Math.cos(b), Math.sin(b) * Math.cos(f3), Math.sin(b) * Math.sin(f3)];
     const level = [-Math.sin(b), Math.cos(b) * Math.cos(f3), Math.cos(b) * Math.sin(f3)];
@@ -410,9 +416,9 @@ window.startPage = (design) => {
       });
       const path = [centre, ...arc, centre];
       scene.pane([centre, ...arc], [...colours.margins[i], 0.22]);
-      path.slice(1).forEach((end, k) => scene.tube(path[k], end, 0.05 * u, colours.margins[i]));
+      path.slice(1).forEach((end, k) => scene.line(path[k], end, 0.05 * u, colours.margins[i]));
       const text = `${MARGINS[i].fold} ${write(fold / DEGREE, 0)}°`;
-      texts.push({ text, at: arc[12], colour: css(colours.names[i]) });
+      texts.push({ text, at: arc[12], colour: css(colours.margins[i]) });
     });
   };
 
@@ -424,9 +430,6 @@ window.startPage = (design) => {
         .slice(0, 3)
         .map((each) => Number(each) / 255);
     const dark = dot(channels(style.backgroundColor), [1, 1, 1]) < 1.5;
-    colours.names = colours.margins.map((each) =>
-      mix(each, dark ? [255, 255, 255] : [0, 0, 0], 0.4),
-    );
     return {
       background: [...channels(style.backgroundColor), 1],
       ink: dark ? [1, 1, 1, 0.22] : [0, 0, 0, 0.22],
@@ -451,20 +454,23 @@ window.startPage = (design) => {
       .join("");
   };
 
-  let found = null;
-  const draw = () => {
-    const look = theme();
+  let texts = [];
+  const build = (found) => {
     scene.clear();
-    const texts = [];
     const tips = platform.map(onPlatform);
-    [[0, 0, 0], [design.a2x, 0, 0], a3].forEach((at, k) => texts.push({ text: `a${k + 1}`, at }));
-    tips.forEach((at, k) => texts.push({ text: `b${k + 1}`, at }));
+    const feet = [[0, 0, 0], [design.a2x, 0, 0], a3];
+    texts = [
+      ...feet.map((at, k) => ({ text: `a${k + 1}`, at })),
+      ...tips.map((at, k) => ({ text: `b${k + 1}`, at })),
+    ];
     if (state.shown.bodies) drawBodies(found);
     scene.cast();
     if (state.shown.flags) drawFlags();
-    if (state.shown.margins) drawMargins(texts);
-    if (state.shown.folds) drawFolds(texts);
-    scene.draw({ ground: GROUND - 0.01 * u, cell: square, ...look });
+    if (state.shown.margins) drawMargins();
+    if (state.shown.folds) drawFolds();
+  };
+  const draw = () => {
+    scene.draw({ ground: GROUND - 0.01 * u, cell: square, ...theme() });
     scene.label(texts);
     showAxes();
   };
@@ -484,7 +490,7 @@ window.startPage = (design) => {
     pending ||= requestAnimationFrame(() => {
       pending = 0;
       if (stale) {
-        found = showAnswers();
+        build(showAnswers());
         showSliders();
       }
       stale = false;
@@ -506,7 +512,7 @@ window.startPage = (design) => {
   const setShown = (name, on) => {
     state.shown[name] = on;
     find(`show-${name}`).checked = on;
-    request();
+    refresh();
   };
   const names = { bodies: "Legs", flags: "Flags", margins: "Margins", folds: "Folds" };
   find("shown").replaceChildren(
@@ -546,8 +552,6 @@ window.startPage = (design) => {
   });
   find("all").open = window.innerWidth >= 1100;
   find("scale").textContent = `1 square = ${square} mm`;
-  if (!scene.isReady)
-    say("This browser draws no WebGL, so the scene stays empty; the numbers hold.");
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => request());
   say();
   buildSliders();
@@ -560,5 +564,5 @@ window.startPage = (design) => {
     framed = true;
     request();
   }).observe(find("view"));
-  return { ...mechanism, state, take, takeFolds, change, goHome, goToMode, turn };
+  return { ...mechanism, state, take, change, goToMode };
 };

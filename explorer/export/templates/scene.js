@@ -4,7 +4,6 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
   const gl = canvas.getContext("webgl2", { alpha: false, antialias: true, stencil: true });
   const HALF_VIEW = Math.tan((16 * Math.PI) / 180);
   const STRIDE = 10;
-  const SIDES = 20;
 
   const camera = { azimuth: -0.947, elevation: 0.467, distance: 1, target: [0, 0, 0] };
   const unit = (a) => {
@@ -13,86 +12,131 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
   };
   const blend = (...terms) => terms.reduce((sum, [share, a]) => along(sum, share, a), [0, 0, 0]);
 
-  // --- Meshes: rows of position, normal and colour; without a normal what is seen is the colour.
-  const meshes = () => ({ solid: [], clear: [], casting: 0 });
-  let parts = meshes();
-  const NONE = [0, 0, 0];
+  // --- Meshes: vertices of position, normal and colour; one without a normal has its colour as it is.
+  const growing = () => ({ data: new Float32Array(1 << 17), used: 0 });
+  const solid = growing();
+  let [casting, panes] = [0, []];
 
-  const rows = (list, corners, normals, [red, green, blue, alpha = 1]) =>
-    corners.forEach((corner, k) =>
-      list.push(...corner, ...normals[k], red / 255, green / 255, blue / 255, alpha),
-    );
-  const triangle = (corners, colour, normals) => {
-    const [a, b, c] = corners;
-    const normal =
-      normals ?? Array.from({ length: 3 }, () => unit(cross(minus(b, a), minus(c, a))));
-    rows(parts.solid, corners, normal, colour);
+  const write = (list, ...numbers) => {
+    if (list.used + STRIDE > list.data.length) {
+      const larger = new Float32Array(2 * list.data.length);
+      larger.set(list.data);
+      list.data = larger;
+    }
+    for (let k = 0; k < STRIDE; k += 1) list.data[list.used + k] = numbers[k];
+    list.used += STRIDE;
   };
-  const quad = ([a, b, c, d], colour, normals) => {
-    triangle([a, b, c], colour, normals && [normals[0], normals[1], normals[2]]);
-    triangle([a, c, d], colour, normals && [normals[0], normals[2], normals[3]]);
-  };
-
-  // A translucent polygon, a fan about its first corner.
-  const pane = (corners, colour) => {
-    const list = [];
+  const inkOf = ([red, green, blue, alpha = 1]) => [red / 255, green / 255, blue / 255, alpha];
+  const polygon = (list, corners, normal, ink) => {
     for (let k = 1; k + 1 < corners.length; k += 1)
-      rows(list, [corners[0], corners[k], corners[k + 1]], [NONE, NONE, NONE], colour);
+      for (const corner of [corners[0], corners[k], corners[k + 1]])
+        write(list, ...corner, ...normal, ...ink);
+  };
+  // A flat convex face.
+  const face = (corners, colour) => {
+    const [a, b, c] = corners;
+    polygon(solid, corners, unit(cross(minus(b, a), minus(c, a))), inkOf(colour));
+  };
+  // A translucent one, or a fan about its first corner.
+  const pane = (corners, colour) => {
     const share = 1 / corners.length;
-    parts.clear.push({ list, centre: blend(...corners.map((corner) => [share, corner])) });
+    panes.push({ corners, colour, centre: blend(...corners.map((corner) => [share, corner])) });
   };
 
-  const circle = Array.from({ length: SIDES + 1 }, (_, k) => {
-    const angle = (2 * Math.PI * k) / SIDES;
-    return [Math.cos(angle), Math.sin(angle)];
-  });
-  const tube = (from, to, radius, colour) => {
-    const axis = unit(minus(to, from));
-    const u = unit(cross(axis, Math.abs(axis[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]));
-    const v = cross(axis, u);
-    const around = circle.map(([c, s]) => blend([c, u], [s, v]));
-    const below = around.map((each) => along(from, radius, each));
-    const above = around.map((each) => along(to, radius, each));
-    for (let k = 0; k < SIDES; k += 1) {
-      const [n, m] = [around[k], around[k + 1]];
-      quad([below[k], below[k + 1], above[k + 1], above[k]], colour, [n, m, m, n]);
-      triangle([to, above[k], above[k + 1]], colour);
-      triangle([from, below[k + 1], below[k]], colour);
+  // Surfaces of revolution about z, of points (radius, height, and the normal's two parts).
+  const ring = (sides) =>
+    Array.from({ length: sides + 1 }, (_, k) => {
+      const angle = (2 * Math.PI * k) / sides;
+      return [Math.cos(angle), Math.sin(angle)];
+    });
+  const revolve = (profile, sides) => {
+    const around = ring(sides);
+    const at = ([radius, height, out, up], [c, s]) => [
+      radius * c,
+      radius * s,
+      height,
+      out * c,
+      out * s,
+      up,
+    ];
+    const vertices = [];
+    for (let row = 0; row + 1 < profile.length; row += 1)
+      for (let k = 0; k < sides; k += 1) {
+        const [lower, upper] = [profile[row], profile[row + 1]];
+        const [now, next] = [around[k], around[k + 1]];
+        const [p, q] = [at(lower, now), at(upper, next)];
+        vertices.push(p, at(lower, next), q, p, q, at(upper, now));
+      }
+    return vertices;
+  };
+  const SIDE = [
+    [1, 0, 1, 0],
+    [1, 1, 1, 0],
+  ];
+  const ENDS = [
+    [0, 0, 0, -1],
+    [1, 0, 0, -1],
+    [1, 1, 0, 1],
+    [0, 1, 0, 1],
+  ];
+  const CYLINDER = [
+    ...revolve(SIDE, 20),
+    ...[0, 2].flatMap((k) => revolve(ENDS.slice(k, k + 2), 20)),
+  ];
+  const LINE = revolve(SIDE, 7);
+  const arc = Array.from({ length: 11 }, (_, k) => (Math.PI * k) / 10);
+  const SPHERE = revolve(
+    arc.map((angle) => [Math.sin(angle), Math.cos(angle), Math.sin(angle), Math.cos(angle)]),
+    18,
+  );
+
+  // Add a surface whose x, y and z axes become u, v and w, with two scales for across and along.
+  const put = (vertices, origin, [u, v, w], across, stretch, colour) => {
+    const [red, green, blue, alpha] = inkOf(colour);
+    for (const [x, y, z, nx, ny, nz] of vertices) {
+      const [sx, sy, sz] = [across * x, across * y, stretch * z];
+      write(
+        solid,
+        origin[0] + sx * u[0] + sy * v[0] + sz * w[0],
+        origin[1] + sx * u[1] + sy * v[1] + sz * w[1],
+        origin[2] + sx * u[2] + sy * v[2] + sz * w[2],
+        nx * u[0] + ny * v[0] + nz * w[0],
+        nx * u[1] + ny * v[1] + nz * w[1],
+        nx * u[2] + ny * v[2] + nz * w[2],
+        red,
+        green,
+        blue,
+        alpha,
+      );
     }
   };
-
-  const sphere = Array.from({ length: 13 }, (_, row) => {
-    const angle = (Math.PI * row) / 12;
-    return circle.map(([c, s]) => [Math.sin(angle) * c, Math.sin(angle) * s, Math.cos(angle)]);
-  });
-  const ball = (centre, radius, colour) => {
-    for (let row = 0; row < 12; row += 1)
-      for (let k = 0; k < SIDES; k += 1) {
-        const normals = [sphere[row][k], sphere[row + 1][k], sphere[row + 1][k + 1]];
-        normals.push(sphere[row][k + 1]);
-        quad(
-          normals.map((each) => along(centre, radius, each)),
-          colour,
-          normals,
-        );
-      }
+  const between = (vertices, from, to, radius, colour) => {
+    const w = unit(minus(to, from));
+    const u = unit(cross(w, Math.abs(w[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]));
+    put(vertices, from, [u, cross(w, u), w], radius, length(minus(to, from)), colour);
   };
+  const tube = (...ends) => between(CYLINDER, ...ends);
+  const line = (...ends) => between(LINE, ...ends);
+  const UPRIGHT = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ];
+  const ball = (centre, radius, colour) => put(SPHERE, centre, UPRIGHT, radius, radius, colour);
 
   // The hull of discs around points of a plane, from height `low` to `high` above it; `place` puts
   // it into the scene.
   const plate = (points, radius, low, high, colour, place = (point) => point) => {
     const rim = hull(
-      points.flatMap(([x, y]) => circle.map(([c, s]) => [x + radius * c, y + radius * s])),
+      points.flatMap(([x, y]) => ring(20).map(([c, s]) => [x + radius * c, y + radius * s])),
     );
     const at = (height) => rim.map(([x, y]) => place([x, y, height]));
     const [below, above] = [at(low), at(high)];
+    face(above, colour);
+    face(below.toReversed(), colour);
     rim.forEach((_, k) => {
       const next = (k + 1) % rim.length;
-      quad([below[k], below[next], above[next], above[k]], colour);
-      if (k > 0 && next > 0) {
-        triangle([above[0], above[k], above[next]], colour);
-        triangle([below[0], below[next], below[k]], colour);
-      }
+      face([below[k], below[next], above[next], above[k]], colour);
     });
   };
   const box = (low, high, colour) => {
@@ -110,7 +154,7 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
       const chain = [];
       for (const point of list) {
         const turns = ([a, b]) =>
-          (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0]) > 1e-12;
+          (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0]) > 0;
         while (chain.length > 1 && !turns(chain.slice(-2))) chain.pop();
         chain.push(point);
       }
@@ -361,29 +405,32 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
     gl.uniform1f(body.uniform("ground"), ground);
     gl.uniform3fv(body.uniform("back"), back);
     gl.uniform3fv(body.uniform("light"), unit(blend([0.9, up], [-0.35, right], [0.6, back])));
-    const show = (list) => {
-      gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(list), gl.DYNAMIC_DRAW);
-      return (count = list.length / STRIDE) => gl.drawArrays(gl.TRIANGLES, 0, count);
-    };
-    const solid = show(parts.solid);
+    const load = ({ data, used }) =>
+      gl.bufferData(gl.ARRAY_BUFFER, data.subarray(0, used), gl.DYNAMIC_DRAW);
+    const show = (used) => gl.drawArrays(gl.TRIANGLES, 0, used / STRIDE);
+    load(solid);
     if (back[2] > 0) {
       // Where shadows overlap, the ground is darkened once.
       gl.enable(gl.STENCIL_TEST);
       gl.stencilFunc(gl.EQUAL, 0, 255);
       gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
       gl.uniform4f(body.uniform("shadow"), -0.18, 0.12, 1, 0.13);
-      solid(parts.casting);
+      show(casting);
       gl.disable(gl.STENCIL_TEST);
     }
     gl.uniform4f(body.uniform("shadow"), 0, 0, 1, 0);
     gl.enable(gl.DEPTH_TEST);
     gl.disable(gl.BLEND);
-    solid();
+    show(solid.used);
     // Translucent parts from back to front.
     gl.enable(gl.BLEND);
     gl.depthMask(false);
-    const sorted = parts.clear.toSorted((a, b) => dot(a.centre, back) - dot(b.centre, back));
-    if (sorted.length) show(sorted.flatMap(({ list }) => list))();
+    const sorted = panes.toSorted((a, b) => dot(a.centre, back) - dot(b.centre, back));
+    const translucent = growing();
+    for (const { corners, colour } of sorted)
+      polygon(translucent, corners, [0, 0, 0], inkOf(colour));
+    load(translucent);
+    show(translucent.used);
     gl.depthMask(true);
   };
 
@@ -397,7 +444,8 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
       if (!at) return;
       const { text, colour } = texts[index];
       if (span.textContent !== text) span.textContent = text;
-      span.style.setProperty("--colour", colour ?? "var(--text)");
+      span.className = colour ? "tinted" : "";
+      span.style.setProperty("--colour", colour ?? "");
       const width = 7.2 * text.length;
       const x = at[0] + 7;
       let y = at[1] - 18;
@@ -410,12 +458,13 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
   };
 
   const clear = () => {
-    parts = meshes();
+    solid.used = 0;
+    panes = [];
   };
   // Let what has been added so far, and nothing that follows, cast a shadow.
   const cast = () => {
-    parts.casting = parts.solid.length / STRIDE;
+    casting = solid.used;
   };
-  const shapes = { clear, cast, pane, tube, ball, plate, box };
+  const shapes = { clear, cast, pane, tube, line, ball, plate, box };
   return { ...shapes, draw, label, fit, sees, axesOf, isReady: Boolean(gl) };
 };

@@ -213,7 +213,7 @@ SHARING = Feature(
         Export(
             "Kernel for controllers",
             "Kinematics and limits of the design as C99 source, in millimetres.",
-            ("C",),
+            ("C (zip)",),
             lambda services, _, who: send_kernel(services, who),
         ),
     ),
