@@ -21,12 +21,11 @@ def trajectory_csv(trajectory: Trajectory) -> str:
     last bit.
     """
     columns = [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
-    unit = repr(trajectory.unit_mm).removesuffix(".0")
-    head = ["time_s", *(f"{name} [{unit} mm]" for name in (*JOINTS, *"xyz"))]
+    head = ["time_s", *length_heads((*JOINTS, *"xyz"), trajectory.unit_mm)]
     head += ["qw", "qx", "qy", "qz"]
     if trajectory.tool_position is not None:
         columns.append(trajectory.tool_position)
-        head += [f"tool_{axis} [{unit} mm]" for axis in "xyz"]
+        head += length_heads([f"tool_{axis}" for axis in "xyz"], trajectory.unit_mm)
     return _csv(head, np.column_stack(columns).tolist())
 
 
@@ -52,6 +51,12 @@ def tolerance_csv(costs: SourceCosts) -> str:
         for k in sorted(range(len(SOURCES)), key=lambda k: PARTS[k])
     ]
     return _csv(TOLERANCE_COLUMNS, rows)
+
+
+def length_heads(names: Iterable[str], unit_mm: float) -> list[str]:
+    """Return headings of lengths in design units, such as "l1 [10 mm]"."""
+    unit = repr(unit_mm).removesuffix(".0")
+    return [f"{name} [{unit} mm]" for name in names]
 
 
 def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:

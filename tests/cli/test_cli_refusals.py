@@ -19,7 +19,7 @@ forward --joints | six numbers in the order l1 d1 d2 d3 d4 l4; got 0
 forward --joints 1 2 3 4 5 6 7 | six numbers in the order l1 d1 d2 d3 d4 l4; got 7
 forward --joints -1 2 3 4 5 6 | explorer: the length l1 must not be negative
 forward --joint 1 2 3 4 5 6 | no option --joint (did you mean --joints?); see
-forward | explorer forward: missing --joints; see
+forward | give either --joints or --joints-file
 foward | did you mean forward?
 inverse --quaternion 1 | four numbers in the order w x y z; got 1
 inverse --quaternion 0 0 0 0 | quaternion

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
-from explorer.cli import options, output
-from explorer.cli.values import numbers
-from explorer.errors import NoAnswerError
+from explorer.cli import options, output, values
+from explorer.errors import InputError, NoAnswerError
+from explorer.export import pose_tables
+from explorer.files.writing import check_writable, read_at_most, write_whole
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism import kinematics
 from explorer.mechanism.configuration import Configuration, tool_offset
@@ -30,14 +32,33 @@ from explorer.workspace.limits.table import joint_ranges
 
 @dataclass(frozen=True, kw_only=True)
 class Inverse(options.JsonOptions, options.PoseOptions):
-    """Compute the joints of a pose.
+    """Compute the joints of a pose, or of a table of poses.
 
-    Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design are listed.
+    Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design are listed. A table is a
+    CSV file with the columns x, y, z (or tool_x, tool_y, tool_z with `--at tool`) and qw, qx, qy,
+    qz, or yaw, pitch, roll, or azimuth, tilt, torsion. A heading may have a unit, such as x_mm,
+    x [10 mm] or yaw_deg; without one it is the design's unit, or degrees.
     """
 
+    poses: Annotated[Path | None, values.hint("instead of one pose", "FILE.csv")] = None
+    """Table of poses; without an orientation of their own they have that of the options."""
+
+    out: Annotated[Path | None, values.hint("with --poses", "FILE.csv")] = None
+    """Table to write: joints, mode, pose, and the violated limits of each line."""
+
     def run(self) -> None:
-        """Write the joints of the pose."""
+        """Write the joints of the pose or of the poses."""
         design = self.read_design()
+        files = _files("--poses", self.poses, self.out)
+        if files is not None:
+            if self.position is not None or self.folds is not None:
+                raise InputError("--poses has the positions; leave --position and --folds out")
+            table = _read_table(files[0], design)
+            rotation = self.oriented_home(design).rotation
+            poses = pose_tables.read_poses(table, design, rotation, self.at)
+            answer = pose_tables.inverse_answer(table, poses, self.at)
+            _write_answer(self, files, answer)
+            return
         snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
         self.write(lambda: _inverse_json(snapshot, tool), _inverse_lines(snapshot, tool))
 
@@ -60,21 +81,75 @@ def _inverse_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
     yield from output.limits_lines(snapshot)
 
 
+def _files(option: str, table: Path | None, out: Path | None) -> tuple[Path, Path] | None:
+    """Return a table to read and the file to write; None if neither is given."""
+    if table is None and out is None:
+        return None
+    if table is None or out is None:
+        raise InputError(f"{option} FILE.csv is read and --out FILE.csv is written: give both")
+    check_writable(out)
+    return table, out
+
+
+def _read_table(path: Path, design: Design) -> pose_tables.Table:
+    data = read_at_most(path, pose_tables.MOST_BYTES)
+    return pose_tables.parse_table(str(path), data, design.unit_mm)
+
+
+def _write_answer(
+    command: Inverse | Forward, files: tuple[Path, Path], answer: pose_tables.TableAnswer
+) -> None:
+    """Write the table of an answer, and how many of its lines are within the limits."""
+    table, out = files
+    write_whole(out, answer.csv.encode())
+    line, fault = answer.first or (None, None)
+    lines = [f"{answer.lines} lines of {table}, written to {out}"]
+    if answer.closing < answer.lines:
+        lines.append(f"{answer.closing} of them close")
+    lines.append(f"{answer.within} of them are within the limits")
+    if line is not None:
+        lines.append(f"the first that is not is line {line}: {fault}")
+    command.write(
+        lambda: {
+            "file": out,
+            **output.attributes(answer, "lines closing within"),
+            "first_outside": None if line is None else {"line": line, "fault": fault},
+        },
+        lines,
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class Forward(options.JsonOptions, options.PointOptions):
-    """Compute the eight assembly modes of the joints.
+    """Compute the eight assembly modes of the joints, or of a table of joints.
 
     All eight are real or none is. If none is, the exit status is 1 and the message names the
     failing trilateration and the smallest change of a joint that makes it feasible.
     """
 
-    joints: Annotated[Six, numbers(" ".join(JOINTS))]
+    joints: Annotated[Six | None, values.numbers(" ".join(JOINTS)), values.OPTIONAL] = None
     """Values of the joints, in design units."""
+
+    joints_file: Annotated[Path | None, values.hint("instead of --joints", "FILE.csv")] = None
+    """Table of joints: a CSV file with the columns l1, d1, d2, d3, d4 and l4; a heading may have a
+    unit, such as l1_mm or l1 [10 mm], without which it is the design's unit."""
+
+    out: Annotated[Path | None, values.hint("with --joints-file", "FILE.csv")] = None
+    """Table to write: joints, mode, pose, and the violated limits, in eight lines for each."""
 
     def run(self) -> None:
         """Write all eight poses of the joints."""
         design = self.read_design()
-        joints = np.array(self.joints)
+        files = _files("--joints-file", self.joints_file, self.out)
+        if (files is None) == (self.joints is None):
+            raise InputError("give either --joints or --joints-file")
+        if files is not None:
+            table = _read_table(files[0], design)
+            joints = pose_tables.read_joints(table)
+            answer = pose_tables.forward_answer(table, design, joints, self.at)
+            _write_answer(self, files, answer)
+            return
+        joints = np.array(self.joints, dtype=np.float64)
         squares = kinematics.discriminants(design, joints)
         modes = kinematics.forward(design, joints)
         if not modes.feasible:
@@ -83,7 +158,7 @@ class Forward(options.JsonOptions, options.PointOptions):
             raise NoAnswerError(_failure_message(design, joints, squares))
         tool = design.tool.position
         shown_tool = tool if self.at == "tool" or any(tool) else None
-        rows = [("joint", *JOINTS), ("units", *output.figures(self.joints))]
+        rows = [("joint", *JOINTS), ("units", *output.figures(joints.tolist()))]
         self.write(
             lambda: {
                 "feasible": True,

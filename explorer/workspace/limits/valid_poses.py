@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from explorer.legs.clearance import joined_pairs, radii_of_pairs
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.number_text import Unit
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.quantities import Demand
@@ -137,14 +137,7 @@ def violations(
 
     For the signs and the order of the carriages see `demands_of`.
     """
-    design = configuration.design
-    demands, row = demands_of(design, signs, order), configuration.variables
-    rows = rows_of(design, demands)
-    values = np.empty((len(configuration.positions), len(demands)))
-    poses = configuration.positions, configuration.rotations
-    quantities.quantity_rows(len(values), row, rows, *poses, values)
-    lows, highs = rows[:, quantities.LOW], rows[:, quantities.HIGH]
-    beyond = np.greater(values, highs) * 1 - np.less(values, lows)
+    demands, values, beyond = sides_of_limits(configuration, signs, order)
     return [
         tuple(
             Violation(demand, math.degrees(value) if demand.angle else value, above=side > 0)
@@ -153,3 +146,24 @@ def violations(
         )
         for row, sides in zip(values.tolist(), beyond.tolist(), strict=True)
     ]
+
+
+def sides_of_limits(
+    configuration: Configuration,
+    signs: tuple[int, int, int] | None = None,
+    order: int | None = None,
+) -> tuple[tuple[Demand, ...], FloatArray, IntArray]:
+    """Return the m demands of a design, their quantities in n poses (n, m), and the sides, (n, m).
+
+    Quantities are in design units and radians. The side is 1 above a maximum, −1 below a minimum,
+    and otherwise 0. The demands are in the order of the design file; for the signs and the order of
+    the carriages see `demands_of`.
+    """
+    design = configuration.design
+    demands, row = demands_of(design, signs, order), configuration.variables
+    rows = rows_of(design, demands)
+    values = np.empty((len(configuration.positions), len(demands)))
+    poses = configuration.positions, configuration.rotations
+    quantities.quantity_rows(len(values), row, rows, *poses, values)
+    lows, highs = rows[:, quantities.LOW], rows[:, quantities.HIGH]
+    return demands, values, np.greater(values, highs) * 1 - np.less(values, lows)

@@ -1,0 +1,357 @@
+"""Tables of poses and of joints as CSV: read with the units of their columns, answered by line.
+
+A heading is a name with a unit, such as `x_mm`, `x [mm]`, `x [10 mm]` or `yaw_deg`. Without a unit
+a length is in design units and an angle in degrees. Columns with other names are ignored, so that
+a trajectory and the answers of this module are tables too. Spreadsheets of some countries separate
+columns by semicolons, with decimal commas; these are read as well.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError
+from explorer.export.tables import length_heads
+from explorer.mechanism import kinematics
+from explorer.mechanism.configuration import Configuration, Point, offset_of
+from explorer.mechanism.design import JOINTS, LENGTHS, Design
+from explorer.mechanism.margins import mode_of
+from explorer.mechanism.pose import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_yaw_pitch_roll,
+)
+from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.checks import STIFFEST, size_problem
+from explorer.workspace.limits.valid_poses import sides_of_limits
+
+MOST_BYTES = 100_000_000
+"""Largest size of a table."""
+MOST_LINES = 100_000
+"""Largest number of poses or joints in a table."""
+TOO_LONG = "the lengths do not close"
+"""What is wrong with joints that have no pose."""
+
+POSITION, TOOL = ("x", "y", "z"), ("tool_x", "tool_y", "tool_z")
+QUATERNION = ("qw", "qx", "qy", "qz")
+YAW_PITCH_ROLL, TILT_TORSION = ("yaw", "pitch", "roll"), ("azimuth", "tilt", "torsion")
+_ROTATIONS: dict[tuple[str, ...], Callable[[ArrayLike], FloatArray]] = {
+    QUATERNION: rotation_from_quaternion,
+    YAW_PITCH_ROLL: rotation_from_yaw_pitch_roll,
+    TILT_TORSION: rotation_from_tilt_torsion,
+}
+
+# The factor of each unit: to millimetres, degrees and seconds.
+_LENGTH = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+_ANGLE = {"deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)}
+_UNITS: dict[str, Mapping[str, float]] = {
+    **dict.fromkeys((*JOINTS, *POSITION, *TOOL), _LENGTH),
+    **dict.fromkeys((*YAW_PITCH_ROLL, *TILT_TORSION), _ANGLE),
+    **{name: {} for name in QUATERNION},
+    "time": {"s": 1.0},
+}
+_HEADING = re.compile(r"(\w+?)\s*(?:[\[(]\s*([-+.\de]*)\s*([a-z°]+)\s*[\])]|_(mm|cm|m|deg|rad|s))?")
+
+
+class Column(NamedTuple):
+    """A column: its place among the cells of a line, its heading, and the factor of its unit.
+
+    The factor leads to design units, degrees or seconds.
+    """
+
+    place: int
+    heading: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text whose known columns are read as numbers.
+
+    Attributes:
+        file: Name of the file, for messages.
+        columns: Known columns by their names, without units.
+        rows: Number of the line in the file, and cells, of each line that is not blank.
+        decimal: The decimal sign of numbers, a point or a comma.
+    """
+
+    file: str
+    columns: Mapping[str, Column]
+    rows: Sequence[tuple[int, list[str]]]
+    decimal: str
+
+    @property
+    def lines(self) -> list[int]:
+        """The number of the line in the file of each row."""
+        return [line for line, _ in self.rows]
+
+    def numbers(self, *names: str) -> FloatArray:
+        """Return columns as numbers, shape (n, len(names)), in design units, degrees or seconds.
+
+        Raises:
+            InputError: A column is missing, or a cell is no finite number; the message has its
+                line and column.
+        """
+        missing = [name for name in names if name not in self.columns]
+        if missing:
+            raise InputError(
+                f"{self.file} has no column {missing[0]}; it needs {', '.join(names)}, each with "
+                f"its unit if it has one, such as {names[0]}{_example(names[0])}"
+            )
+        columns = [self.columns[name] for name in names]
+        values = np.empty((len(self.rows), len(names)))
+        for index, (_, cells) in enumerate(self.rows):
+            for k, (place, _, factor) in enumerate(columns):
+                try:
+                    value = factor * float(cells[place].replace(self.decimal, "."))
+                except ValueError:
+                    self.refuse(index, names[k], f"a number, such as 12{self.decimal}5, is needed")
+                if problem := size_problem(value, most=STIFFEST):
+                    self.refuse(index, names[k], f"this {problem}")
+                values[index, k] = value
+        return values
+
+    def refuse(self, index: int, name: str, needs: str) -> NoReturn:
+        """Raise the error of a cell, with its line, its column, and what it needs to be."""
+        line, cells = self.rows[index]
+        place, heading, _ = self.columns[name]
+        raise InputError(f"{self.file}, line {line}, column {heading}: {cells[place]!r}: {needs}")
+
+
+def _example(name: str) -> str:
+    return f"_{next(iter(_UNITS[name]))}" if _UNITS[name] else ""
+
+
+def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
+    """Return the table in the contents of a CSV file.
+
+    Args:
+        file: Name of the file, for messages.
+        data: Contents: UTF-8, with or without a byte order mark, or Windows-1252.
+        unit_mm: Millimetres in the design unit of the table's numbers.
+
+    Raises:
+        InputError: The file is no table, or a heading has a wrong unit or appears twice.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", errors="replace")
+    first = next((line for line in text.splitlines() if line.strip(" ;,\t")), "")
+    separator = next((sign for sign in ";\t" if sign in first), ",")
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+    try:
+        rows = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+    except csv.Error as error:
+        raise InputError(f"{file}, line {reader.line_num}: this is no CSV: {error}") from None
+    if not 2 <= len(rows) <= MOST_LINES + 1:
+        raise InputError(
+            f"{file} needs a line of headings, such as x_mm, and 1 to {MOST_LINES} lines of "
+            f"numbers below it; it has {len(rows)} lines that are not blank"
+        )
+    columns: dict[str, Column] = {}
+    for place, heading in enumerate(cell.strip() for cell in rows[0][1]):
+        match = _HEADING.fullmatch(heading.lower())
+        if match is None or match[1] not in _UNITS:
+            continue
+        if match[1] in columns:
+            raise InputError(f"{file} has two columns {match[1]}: leave one out")
+        factor = _factor(match, unit_mm)
+        if factor is None:
+            units = ", ".join(_UNITS[match[1]])
+            raise InputError(
+                f"{file}, column {heading}: its unit must be "
+                + (
+                    f"one of {units}, such as {match[1]}{_example(match[1])}"
+                    if units
+                    else "left out"
+                )
+            )
+        columns[match[1]] = Column(place, heading, factor)
+    width = len(rows[0][1])
+    for line, cells in rows[1:]:
+        if any(map(str.strip, cells[width:])):
+            raise InputError(
+                f"{file}, line {line} has {len(cells)} cells below {width} headings; numbers have "
+                "decimal points, or semicolons separate the columns"
+            )
+        cells.extend([""] * (width - len(cells)))
+    return Table(file, columns, rows[1:], "," if separator == ";" else ".")
+
+
+def _factor(match: re.Match[str], unit_mm: float) -> float | None:
+    """Return the factor of a heading's unit; None if the column cannot have this unit."""
+    name, number, *units = match.groups()
+    unit = units[0] or units[1]
+    if unit is None:
+        return 1.0
+    try:
+        factor = _UNITS[name][unit] * float(number or 1.0)
+    except (KeyError, ValueError):
+        return None
+    return factor / unit_mm if _UNITS[name] is _LENGTH else factor
+
+
+def read_poses(
+    table: Table, design: Design, rotation: FloatArray, at: Point = "b4"
+) -> Configuration:
+    """Return the poses of a table; the rotation (3, 3) is theirs if it states no orientation.
+
+    With `at` "tool" the columns `tool_x`, `tool_y` and `tool_z` are the positions of the tool.
+
+    Raises:
+        InputError: A column is missing, or a cell is faulty.
+    """
+    stated = [names for names in _ROTATIONS if not table.columns.keys().isdisjoint(names)]
+    if len(stated) > 1:
+        both = " and ".join(f"the columns {', '.join(names)}" for names in stated)
+        raise InputError(f"{table.file} states the orientation twice, by {both}: leave one out")
+    for names in stated:
+        values = table.numbers(*names)
+        zeros: list[int] = np.flatnonzero(~values.any(axis=1)).tolist()
+        if names == QUATERNION and zeros:
+            table.refuse(
+                zeros[0], "qw", "a quaternion must not be all zeros; no turn is 1, 0, 0, 0"
+            )
+        rotation = _ROTATIONS[names](values)
+    position = table.numbers(*(POSITION if at == "b4" else TOOL))
+    return Configuration(design, position - offset_of(design, rotation, at), rotation)
+
+
+def read_joints(table: Table) -> FloatArray:
+    """Return the joints (l1, d1, d2, d3, d4, l4) of a table, shape (n, 6), in design units.
+
+    Raises:
+        InputError: A column is missing, a cell is faulty, or a length is negative.
+    """
+    joints = table.numbers(*JOINTS)
+    for name in LENGTHS:
+        negative: list[int] = np.flatnonzero(joints[:, JOINTS.index(name)] < 0.0).tolist()
+        if negative:
+            table.refuse(negative[0], name, "a length must not be negative")
+    return joints
+
+
+class TableAnswer(NamedTuple):
+    """A table of poses with their joints, and what became of the lines of the given one.
+
+    Attributes:
+        csv: The answer as CSV, a line per pose.
+        lines: Number of lines that were given.
+        closing: Number of them that have a pose.
+        within: Number of them with a pose within the limits.
+        first: Line number and fault of the first line without a pose within the limits.
+    """
+
+    csv: str
+    lines: int
+    closing: int
+    within: int
+    first: tuple[int, str] | None
+
+
+def inverse_answer(table: Table, poses: Configuration, at: Point = "b4") -> TableAnswer:
+    """Return the joints of the poses of a table, and which limits each violates."""
+    count = len(table.rows)
+    return _answer(table, np.arange(count), poses, poses.joints, np.ones(count, np.bool_), at)
+
+
+def forward_answer(
+    table: Table, design: Design, joints: FloatArray, at: Point = "b4"
+) -> TableAnswer:
+    """Return the eight modes of the joints (n, 6) of a table, and which limits each violates.
+
+    Joints that do not close have one line without a mode.
+    """
+    modes = kinematics.forward(design, joints)
+    given, mode = np.nonzero(modes.feasible[:, None] | (np.arange(8) == 0))
+    poses = Configuration(design, modes.position[given, mode], modes.rotation[given, mode])
+    return _answer(table, given, poses, joints, modes.feasible, at)
+
+
+def _answer(
+    table: Table,
+    given: IntArray,
+    poses: Configuration,
+    joints: FloatArray,
+    closes: BoolArray,
+    at: Point,
+) -> TableAnswer:
+    """Return the answer for joints (n, 6), with the index of each pose's line in the table, (m,).
+
+    Joints that do not close have one pose, which is left out.
+    """
+    mode, (verdicts, verdict) = mode_of(poses.margins), _verdicts(poses)
+    heads, numbers = _columns(poses, len(given), at)
+    time = [name for name in ("time",) if name in table.columns]
+    known = np.hstack([table.numbers(*time), joints]).tolist()
+    starts = [
+        f"{line},{','.join(map(repr, row))}" for line, row in zip(table.lines, known, strict=True)
+    ]
+    rows: list[str] = []
+    for index, number, row, which in zip(
+        given.tolist(), mode.tolist(), numbers.tolist(), verdict.tolist(), strict=True
+    ):
+        broken, words = verdicts[int(which)]
+        if closes[index]:
+            values = ",".join([str(number), *map(repr, row), "false" if broken else "true"])
+            rows.append(f"{starts[index]},{values},{words}")
+        else:
+            rows.append(f"{starts[index]},{',' * len(row)},false,{TOO_LONG}")
+    within = np.zeros(len(closes), dtype=np.bool_)
+    count = np.array([each.broken for each in verdicts])[verdict]
+    within[given[closes[given] & (count == 0)]] = True
+    outside: list[int] = np.flatnonzero(~within).tolist()
+    first = (table.lines[outside[0]], TOO_LONG) if outside else None
+    if outside and closes[outside[0]]:
+        # Of eight modes the one that violates the fewest limits.
+        rows_there: list[int] = np.flatnonzero(given == outside[0]).tolist()
+        best = min(rows_there, key=count.tolist().__getitem__)
+        words = verdicts[int(verdict[best])].words
+        first = table.lines[outside[0]], f"mode {mode[best]} violates {words}"
+    start = ["line", *(f"{name}_s" for name in time), *length_heads(JOINTS, poses.design.unit_mm)]
+    head = [*start, "mode", *heads, "within_limits", "violations"]
+    text = "\n".join([",".join(head), *rows, ""])
+    return TableAnswer(text, len(closes), int(closes.sum()), int(within.sum()), first)
+
+
+class _Verdict(NamedTuple):
+    """How many limits a pose violates, and their names in the order of the design file."""
+
+    broken: int
+    words: str
+
+
+def _verdicts(poses: Configuration) -> tuple[list[_Verdict], IntArray]:
+    """Return the different verdicts on poses, and the index of that of each pose, (m,)."""
+    demands, _, sides = sides_of_limits(poses)
+    ends = np.array([demand.end_names() for demand in demands]).reshape(-1, 2)
+    # Poses violate few of all sets of limits, each a number in balanced ternary digits.
+    sets = sides @ 3 ** np.arange(len(demands))
+    _, first, which = np.unique(sets, return_index=True, return_inverse=True)
+    names: list[list[str]] = [
+        ends[side != 0, (side[side != 0] > 0) * 1].tolist() for side in sides[first]
+    ]
+    return [_Verdict(len(each), "; ".join(each)) for each in names], which
+
+
+def _columns(poses: Configuration, count: int, at: Point) -> tuple[list[str], FloatArray]:
+    """Return the headings and the numbers of poses, shape (count, 7), or (count, 10) with tools."""
+    position = np.broadcast_to(poses.position, (count, 3))
+    rotation = np.broadcast_to(poses.rotation, (count, 3, 3))
+    heads = [*length_heads(POSITION, poses.design.unit_mm), *QUATERNION]
+    numbers = [position, quaternion_from_rotation(rotation)]
+    if at == "tool":
+        heads += length_heads(TOOL, poses.design.unit_mm)
+        numbers.append(position + offset_of(poses.design, rotation, at))
+    return heads, np.hstack(numbers)
