@@ -20,8 +20,8 @@ from explorer.errors import ExplorerError, NoAnswerError
 
 COMMANDS: Mapping[str, str] = {
     "serve": "Serve the explorer's page and open it in the browser (the default).",
-    "inverse": "Compute the joints of a pose.",
-    "forward": "Compute the eight assembly modes of the joints.",
+    "inverse": "Compute the joints of a pose, or of a table of poses.",
+    "forward": "Compute the eight assembly modes of the joints, or of a table of joints.",
     "singularity": "Measure how near a pose is to a singularity, and to which.",
     "forces": "Compute the forces of actuators and struts under a load, and their limits.",
     "accuracy": "Compute the errors and the deflection of the tool in a pose.",
