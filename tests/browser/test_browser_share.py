@@ -9,7 +9,8 @@ import zipfile
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
+from xml.etree.ElementTree import fromstring
 
 import imageio.v3
 import numpy as np
@@ -20,8 +21,10 @@ from playwright.sync_api import Browser, Download, Locator, Page, expect
 from tab import Tab
 
 import explorer
+from explorer.app.scene.placing import scene_scale
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
 from explorer.app.state.actions import Set
+from explorer.app.state.frame import Frame
 from explorer.app.state.view import View
 from explorer.export.controller import kernel_files
 from explorer.export.moving_page import moving_page
@@ -119,6 +122,57 @@ def test_moving_page_and_kernel_are_those_of_the_design(tab: Tab) -> None:
     with zipfile.ZipFile(download.path()) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     assert files == kernel_files(tab.state.design)
+
+
+# Where the page's camera sees points of the scene: its own matrices, as they draw the next frame.
+MATRICES = """() => {
+  const { nodeRefFromName, cameraControl } = window.__viserMutable, { camera } = cameraControl;
+  camera.updateMatrixWorld();
+  const all = [camera.projectionMatrix, camera.matrixWorldInverse, nodeRefFromName[""].matrixWorld];
+  return all.map((matrix) => matrix.elements);
+}"""
+
+
+@pytest.mark.draws
+@pytest.mark.parametrize("view", ["isometric", "front", None])
+def test_figure_points_are_where_the_camera_of_the_page_sees_them(
+    tab: Tab, browser: Browser, view: Literal["isometric", "front"] | None
+) -> None:
+    if view is None:
+        box = tab.page.locator(SCENE_CANVAS).bounding_box()
+        assert box is not None
+        x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.8 * box["height"]
+        tab.page.mouse.move(x, y)
+        tab.page.mouse.down()
+        tab.page.mouse.move(x + 150.0, y - 120.0, steps=6)
+        tab.page.mouse.up()
+    else:
+        tab.look_from(view)
+    tab.picture()
+    download = tab.export("Figure", "SVG 85 mm, black")
+    assert download.suggested_filename == "paper-optimal-figure.svg"
+    root = fromstring(download.path().read_text(encoding="utf-8"))
+    circles = [*root.iter("{http://www.w3.org/2000/svg}circle")]
+    paper = np.array([[float(each.get(key, "")) for key in ("cx", "cy")] for each in circles])
+    points = Frame(tab.state).snapshot.points
+    names = ("a1", "a3", "b1", "b2", "b3", "b4")
+    scene = scene_scale(tab.state) * np.array([getattr(points, name) for name in names])
+    place = np.column_stack([scene, np.ones(6)])
+    project, look, turn = (np.reshape(each, (4, 4)).T for each in tab.page.evaluate(MATRICES))
+    clip = place @ (project @ look @ turn).T
+    # The matrix stretches the picture to a square.
+    flat = clip[:, :2] / clip[:, 3:] / np.diag(project)[:2] * [1.0, -1.0]
+    slope = np.ptp(paper, axis=0).max() / np.ptp(flat, axis=0).max()
+    offset = (paper - slope * flat).mean(axis=0)
+    np.testing.assert_allclose(slope * flat + offset, paper, atol=1e-6 * 340.0)
+    page = browser.new_page(viewport={"width": 400, "height": 400})
+    try:
+        page.set_content(download.path().read_text(encoding="utf-8").partition("?>")[2])
+        drawn = untyped.imread(page.locator("svg").screenshot(), extension=".png")[..., :3]
+    finally:
+        page.close()
+    assert np.ptp(drawn.astype(np.int64), axis=-1).max() <= 2
+    assert drawn.min() == 0
 
 
 def test_scene_as_one_page_works_without_network_and_asks_for_nothing(

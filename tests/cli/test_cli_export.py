@@ -253,6 +253,20 @@ def test_export_scene_is_one_page_with_its_title(cli: CommandLine, tmp_path: Pat
     assert [each.name for each in tmp_path.iterdir()] == [out.name]
 
 
+def test_export_figure_is_an_svg_of_the_view_and_width(cli: CommandLine, tmp_path: Path) -> None:
+    out = tmp_path / "figure.svg"
+    words = ["--view", "side", "--width", "170", "--black", "--no-tetrahedra"]
+    answer = cli.answer("figure", "--out", out, *words)
+    text = out.read_text(encoding="utf-8")
+    assert answer == {"file": str(out), "format": "svg", "bytes": len(text.encode())}
+    assert 'width="170mm"' in text
+    assert 'class="figure black"' in text
+    assert 'class="tetrahedron' not in text
+    # From the right y goes to the right, so the guide, along x, is a point.
+    assert text.count(">y</text>") == text.count(">z</text>") == 1
+    assert ">x</text>" not in text
+
+
 FOLDS = ["--folds", "14", "45", "98", "-140", "-120", "60"]
 
 
@@ -278,6 +292,10 @@ FOLDS = ["--folds", "14", "45", "98", "-140", "-120", "60"]
         ("hull", "hull.step", [], "no mesh format 'step'"),
         ("scene", "out.html", ["--format", "png"], "no format 'png' of the scene; there is html"),
         ("scene", "out.html", ["--density", "3"], "--density is not for scene"),
+        ("scene", "out.html", ["--black"], "--black is not for scene"),
+        ("figure", "out.png", [], "no format 'png' of the figure; there is svg"),
+        ("figure", "out.svg", ["--width", "9"], "a figure is 40 to 400 mm wide, 85 for a column"),
+        ("figure", "out.svg", ["--view", "back"], "'isometric', 'front', 'side', 'top'"),
     ],
 )
 def test_export_unusable_options_are_refused_without_a_file(

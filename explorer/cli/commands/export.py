@@ -1,4 +1,4 @@
-"""`explorer export`: the workspace, the mechanism, its models or pages as files."""
+"""`explorer export`: the workspace, the mechanism, its models, pages or figure as files."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import assembly, mesh, simulation, step
 from explorer.export.controller import kernel_files
+from explorer.export.drawings.figure import COLUMN, figure_svg
+from explorer.export.drawings.mechanism import Projection, ViewName, points_to_show
 from explorer.export.moving_page import moving_page
 from explorer.files.extras import check_extra
 from explorer.files.writing import check_writable, make_folder, write_whole
+from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
@@ -29,7 +32,7 @@ from explorer.statics import accuracy
 from explorer.workspace.solids.solid import convex_hull
 from explorer.workspace.solids.solids import workspace_solid
 
-What = Literal["workspace", "hull", "mechanism", "simulation", "scene", "page", "kernel"]
+What = Literal["workspace", "hull", "mechanism", "simulation", "scene", "page", "figure", "kernel"]
 
 # Typical width of a browser window over its height.
 ASPECT = 1.6
@@ -38,17 +41,18 @@ OF_ALL = ("what", "out", "format", "design", "json")
 
 @dataclass(frozen=True, kw_only=True)
 class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
-    """Write the workspace as a mesh, the mechanism as parts, model, page or kernel, or the scene.
+    """Write the workspace, the mechanism, its models, pages, a figure or the kernel as files.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
     `stl-zip` a part is a file of its own. The simulation is an MJCF model in metres, to include in
     a scene: every joint, closed loops, payload, tool, six servos within the limits of their forces;
     with `--errors` the machine deviates from its design. The scene is one HTML file for any
-    browser, in the home pose unless a pose is given; the page is a smaller one whose mechanism
-    moves, with sliders for pose, joints and folds. The kernel is a folder with the kinematics of
-    the design as C99 source, for controllers. With `--at tool` the workspace and the hull are those
-    of the tool point, with `--load` those of the positions that hold the load.
+    browser, the figure an SVG for a paper with letters and lines of a fixed size, both in the home
+    pose unless a pose is given. The page is a smaller file whose mechanism moves, with sliders for
+    pose, joints and folds. The kernel is a folder with the kinematics of the design as C99 source,
+    for controllers. With `--at tool` the workspace and the hull are those of the tool point, with
+    `--load` those of the positions that hold the load.
     """
 
     what: Annotated[What, tyro.conf.Positional]
@@ -60,7 +64,8 @@ class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     format: Annotated[
         str | None,
         values.hint(
-            "default: the suffix of the file", "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html|c"
+            "default: the suffix of the file",
+            "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html|svg|c",
         ),
     ] = None
     """Format; 3mf has unit, names, colours, ply and obj doubles, step (extra `cad`) exact faces."""
@@ -89,6 +94,18 @@ class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     ] = None
     """Seed of a machine whose dimensions and encoders are off within the tolerances and errors of
     the design, and whose actuators and struts give way as the design states."""
+
+    view: Annotated[ViewName, values.hint("figure; default: isometric")] = "isometric"
+    """View of the figure; all but the isometric one are without perspective."""
+
+    width: Annotated[values.Positive, values.hint("figure; default: 85, a column")] = None
+    """Width of the figure in mm; that of a page is 170."""
+
+    black: values.Flag = False
+    """Draw the figure in black, white and grey."""
+
+    tetrahedra: Annotated[bool, values.hint("figure; default: with them")] = True
+    """Draw the edges of the three tetrahedra in the figure."""
 
     def run(self) -> None:
         """Write the file, and its measures to standard output."""
@@ -262,6 +279,20 @@ def _kernel(command: Export, file_format: str) -> tuple[dict[str, bytes], Facts]
     return files, {"format": "c", "files": list(files)}
 
 
+def _figure(command: Export, file_format: str) -> tuple[bytes, Facts]:
+    if file_format != "svg":
+        raise InputError(f"no format {file_format!r} of the figure; there is svg")
+    design = command.read_design()
+    snapshot = evaluate(design, command.pose(design))
+    from explorer.app.scene.camera import framing, has_perspective
+
+    eye, target = framing(points_to_show(snapshot), command.view, ASPECT)
+    view = Projection.of_camera(eye, target, perspective=has_perspective(target - eye))
+    width, tetrahedra = command.width or COLUMN, [command.tetrahedra] * 3
+    data = figure_svg(snapshot, view, width, black=command.black, tetrahedra=tetrahedra)
+    return data, {"format": "svg", "bytes": len(data)}
+
+
 _ORIENTATION = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
 _FOLDERS = {"kernel": "c"}
 """The format of each object that is a folder of files."""
@@ -272,6 +303,10 @@ _WRITERS: dict[What, tuple[Callable[[Export, str], tuple[Data, Facts]], tuple[st
     "simulation": (_simulation, ("density", "masses", "errors", "typical")),
     "scene": (_scene, ("position", "folds", *_ORIENTATION)),
     "page": (_page, ()),
+    "figure": (
+        _figure,
+        ("position", "folds", *_ORIENTATION, "view", "width", "black", "tetrahedra"),
+    ),
     "kernel": (_kernel, ()),
 }
 """The function that writes each object, and its options besides those of all."""

@@ -1,7 +1,7 @@
 """Elements of HTML and SVG as trees, and blocks as such elements.
 
 A report consists of elements only, whose text is escaped: no name in a design file can become
-markup. Looks are classes of `style.css`.
+markup. Looks are classes of `drawing.css`, and of the report's `style.css`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,13 @@ from xml.etree.ElementTree import Element, tostring
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.files.packaged import packaged_file
 from explorer.measures.blocks import block as kinds
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
+
+PRECISE = 4
+"""Decimals of the numbers of elements; paths with thousands of points have fewer."""
 
 Piece: TypeAlias = "Element | str | float | None"
 Cell: TypeAlias = "Piece | Sequence[Piece]"
@@ -32,7 +36,7 @@ def element(tag: str, *pieces: Piece, **attributes: str | float | None) -> Eleme
     result = Element(tag)
     for name, value in attributes.items():
         if value is not None:
-            words = value if isinstance(value, str) else coordinate(value)
+            words = value if isinstance(value, str) else coordinate(value, PRECISE)
             result.set(name.rstrip("_").replace("_", "-"), printable(words))
     for piece in pieces:
         child = number(piece) if isinstance(piece, float | int) else piece
@@ -58,15 +62,21 @@ def as_html(root: Element) -> str:
     return tostring(root, encoding="unicode", method="html")
 
 
-def coordinate(value: float) -> str:
-    """Return a number rounded to a hundredth, in the fewest characters."""
-    text = f"{value:.2f}".rstrip("0").rstrip(".")
+def coordinate(value: float, decimals: int = 2) -> str:
+    """Return a rounded number in the fewest characters."""
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
-def path_of(points: FloatArray, end: str = "Z") -> str:
+def path_of(points: FloatArray, end: str = "Z", decimals: int = 2) -> str:
     """Return points (n, 2) as the data of a path, a polygon unless `end` is empty."""
-    return "M" + "L".join(f"{coordinate(x)},{coordinate(y)}" for x, y in points.tolist()) + end
+    xy = ((coordinate(x, decimals), coordinate(y, decimals)) for x, y in points.tolist())
+    return "M" + "L".join(map(",".join, xy)) + end
+
+
+def drawing_style() -> str:
+    """Return the stylesheet of drawings."""
+    return packaged_file("export/drawings", "drawing.css").read_text("utf-8")
 
 
 def line(ends: ArrayLike, class_: str | None = None, *, stroke: str | None = None) -> Element:

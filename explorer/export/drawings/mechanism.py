@@ -10,26 +10,36 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.export.drawings.markup import coordinate, drawing_text, element, line, path_of
+from explorer.export.drawings.markup import (
+    PRECISE,
+    coordinate,
+    drawing_text,
+    element,
+    line,
+    path_of,
+)
 from explorer.legs.clearance import leg_axes
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import verdict
 from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import css, proximity_colour
+from explorer.singularity.colours import MARGIN_COLOURS, css, proximity_colour
 
 ViewName = Literal["isometric", "front", "side", "top"]
 Frame: TypeAlias = tuple[float, float, float, float]
 """Left, top, right and bottom of a rectangle on paper."""
 
 WIDTH = 720.0
+# Fills of joints without an incidence.
+DARK, LIGHT = "#343c48", "#ffffff"
 # The share of a leg that is cylinder.
 CYLINDER = 0.56
 # The space around the points of a view, for labels.
@@ -51,33 +61,74 @@ def _axes(name: ViewName) -> FloatArray:
     """Return right, up and towards the eye, in rows, shape (3, 3)."""
     x, y, z = np.eye(3)
     if name == "isometric":
-        toward = _FROM / np.linalg.norm(_FROM)
-        right = np.cross(z, toward)
-        right /= np.linalg.norm(right)
-        return np.array([right, np.cross(toward, right), toward])
+        return _axes_from(_FROM)
     right, up = {"top": (x, y), "front": (x, z), "side": (y, z)}[name]
     return np.array([right, up, np.cross(right, up)])
+
+
+def _axes_from(toward: FloatArray) -> FloatArray:
+    """Return right, up and towards the eye, (3, 3), of an upright view not along z."""
+    toward = toward / np.linalg.norm(toward)
+    right = np.cross([0.0, 0.0, 1.0], toward)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(toward, right), toward])
 
 
 @dataclass(frozen=True)
 class Projection:
     """A view, with its scale in points of paper per design unit and its place on paper, (2,).
 
-    The rows of its axes, (3, 3), are right, up and towards the eye.
+    Attributes:
+        axes: Right, up and towards the eye, in rows, shape (3, 3).
+        scale: Scale in the plane of the target.
+        offset: The target on paper.
+        target: Point in the middle of the view, in design units, shape (3,).
+        distance: Distance of the eye from the target, in design units; infinite without
+            perspective.
     """
 
     axes: FloatArray
     scale: float
     offset: FloatArray
+    target: FloatArray = field(default_factory=lambda: np.zeros(3))
+    distance: float = math.inf
+
+    @staticmethod
+    def of_camera(eye: FloatArray, target: FloatArray, *, perspective: bool) -> Projection:
+        """Return the view of an upright camera at an eye, not above its target, at scale 1."""
+        toward = eye - target
+        axes = _axes_from(toward)
+        distance = float(np.linalg.norm(toward)) if perspective else math.inf
+        return Projection(axes, 1.0, np.zeros(2), target, distance)
 
     def to(self, points: FloatArray) -> FloatArray:
         """Return points (..., 3) on paper, shape (..., 2)."""
-        flat = points @ self.axes[:2].T * self.scale
+        local = (points - self.target) @ self.axes.T
+        flat = local[..., :2] * self.scale / (1.0 - local[..., 2:] / self.distance)
         return flat * np.array([1.0, -1.0]) + self.offset
 
     def depth(self, points: FloatArray) -> FloatArray:
         """Return the nearness of points (..., 3) to the eye, in design units, shape (...)."""
-        return np.asarray(points @ self.axes[2])
+        return np.asarray((points - self.target) @ self.axes[2])
+
+    def side(self, normal: FloatArray, point: FloatArray) -> float:
+        """Return a number with the sign of the eye's side of a plane, of normal and point (3,)."""
+        ray = self.axes[2]
+        if math.isfinite(self.distance):
+            ray = self.target + self.distance * ray - point
+        return float(normal @ ray)
+
+    def fit(self, points: FloatArray, frame: Frame, scale: float | None = None) -> Projection:
+        """Return the view in which points (n, 3) fill a frame, as `fit_view` does."""
+        own = replace(self, scale=1.0, offset=np.zeros(2)).to(points)
+        lows, highs = own.min(axis=0), own.max(axis=0)
+        corners = np.array(frame).reshape(2, 2)
+        if scale is None:
+            # Points that coincide have no size to fit.
+            spans = np.maximum(highs - lows, 1e-9 * float(np.abs(points).max()) or 1.0)
+            scale = float((np.ptp(corners, axis=0) / spans).min())
+        offset = corners.mean(axis=0) - 0.5 * scale * (lows + highs)
+        return replace(self, scale=scale, offset=offset)
 
 
 def extents(name: ViewName, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -93,14 +144,7 @@ def fit_view(
 
     The scale is in points of paper per design unit, the largest that fits if None.
     """
-    lows, highs = extents(name, points)
-    corners = np.array(frame).reshape(2, 2)
-    if scale is None:
-        # Points that coincide have no size to fit.
-        spans = np.maximum(highs - lows, 1e-9 * float(np.abs(points).max()) or 1.0)
-        scale = float((np.ptp(corners, axis=0) / spans).min())
-    middle = 0.5 * (lows + highs) * scale * np.array([1.0, -1.0])
-    return Projection(_axes(name), scale, corners.mean(axis=0) - middle)
+    return Projection(_axes(name), 1.0, np.zeros(2)).fit(points, frame, scale)
 
 
 def labels(
@@ -197,47 +241,104 @@ def svg_drawing(height: float, title: str, *pieces: Element) -> Element:
     )
 
 
-def mechanism(snapshot: Snapshot, view: Projection, box: Frame | None) -> Iterator[Element]:
+def mechanism(
+    snapshot: Snapshot,
+    view: Projection,
+    box: Frame | None,
+    tetrahedra: Sequence[bool] = (False, False, False),
+) -> Iterator[Element]:
     """Yield the elements of a mechanism, with labels within a box, or without labels if None."""
     points = snapshot.points
     legs = leg_axes(Configuration(snapshot.design, snapshot.pose.position, snapshot.rotation))
     tints = [css(proximity_colour(level)) for level in verdict(snapshot).levels]
     guide, carriages = _guide(snapshot), _carriages(snapshot)
-    yield _area(view, [*guide, points.a3], "base", tints[2])
-    yield line(view.to(guide), "rail")
-    yield line(view.to(guide), "flag", stroke=tints[1])
+    base = [
+        _area(view, [*guide, points.a3], "base", tints[2]),
+        line(view.to(guide), "rail"),
+        line(view.to(guide), "flag", stroke=tints[1]),
+    ]
     stations = np.array([points.b4, points.b2, points.b3])
     along = (stations - points.b4) @ snapshot.rotation[:, 0]
     ends = stations[[along.argmin(), along.argmax()]]
-    pieces = [(float(view.depth(leg).mean()), _leg(view, leg)) for leg in legs]
     plate = [
         _area(view, [*ends, points.b1], "platform", tints[0]),
         line(view.to(ends), "flag", stroke=tints[1]),
     ]
-    pieces.append((float(view.depth(np.array([*ends, points.b1])).mean()), plate))
-    for _, elements in sorted(pieces, key=lambda piece: piece[0]):
-        yield from elements
+    edges: list[FloatArray] = []
+    for index, colour in enumerate(MARGIN_COLOURS):
+        if tetrahedra[index]:
+            corners = view.to(np.array([getattr(points, name) for name in TETRAHEDRA[index]]))
+            for pair in itertools.combinations(corners, 2):
+                edges.append(np.array(pair))
+                yield line(pair, f"tetrahedron is-{index + 1}", stroke=css(colour))
+    pieces = [base, plate, *(_leg(view, leg) for leg in legs)]
+    for index in _back_to_front(snapshot, view, legs):
+        yield from pieces[index]
     for x, y in view.to(carriages).tolist():
         yield element("rect", x=x - 5.0, y=y - 5.0, width=10.0, height=10.0, class_="carriage")
-    dots = [(points.a1, 5.0, "joint", tints[0]), (points.a3, 4.2, "joint", None)]
-    dots += [(ball, 4.2, "ball", None) for ball in (points.b1, points.b2, points.b3)]
+    dots = [(points.a1, 5.0, "joint", tints[0]), (points.a3, 4.2, "joint", DARK)]
+    dots += [(ball, 4.2, "ball", LIGHT) for ball in (points.b1, points.b2, points.b3)]
     for point, radius, look, fill in (*dots, (points.b4, 5.0, "ball", tints[2])):
         x, y = view.to(np.asarray(point)).tolist()
         yield element("circle", cx=x, cy=y, r=radius, class_=look, fill=fill)
     if box is not None:
         places = {**points._asdict(), **dict(zip(("d1", "d3"), carriages, strict=True))}
         named = [(name, view.to(np.asarray(point))) for name, point in places.items()]
-        yield element("g", *labels(named, [view.to(ends) for ends in (*legs, guide, ends)], box))
+        lines = [*(view.to(ends) for ends in (*legs, guide, ends)), *edges]
+        yield element("g", *labels(named, lines, box))
+
+
+def _back_to_front(snapshot: Snapshot, view: Projection, legs: FloatArray) -> list[int]:
+    """Return the order of drawing of the base, the platform and the legs, 0 to 5.
+
+    Legs end in the base plane and in the platform plane, so each lies on one side of either.
+    """
+    points, (normal, z) = snapshot.points, (snapshot.rotation[:, 2], np.array([0.0, 0.0, 1.0]))
+    above = view.side(z, points.a1), view.side(normal, points.b4)
+    covers = np.zeros((6, 6), dtype=np.bool_)
+    covers[1, 0] = (points.b1 + points.b2 + points.b3 + points.b4)[2] * above[0] > 0.0
+    covers[0, 1] = not covers[1, 0]
+    for k, (start, end) in enumerate(legs, start=2):
+        covers[k, 0] = end[2] * above[0] >= 0.0
+        covers[k, 1] = (start - points.b4) @ normal * above[1] >= 0.0
+        covers[:2, k] = ~covers[k, :2]
+    for i, j in itertools.permutations(range(4), 2):
+        (a, b), (c, d) = legs[i], legs[j]
+        across = np.cross(b - a, d - c)
+        nearer = (a - c) @ across * view.side(across, c) > 0.0
+        covers[i + 2, j + 2] = nearer and _cross(view.to(legs[i]), view.to(legs[j]))
+    order: list[int] = []
+    left = [*range(6)]
+    while left:
+        # In a circle of legs, each over the next, none is farthest.
+        order.append(min(left, key=lambda i: int(covers[i, left].sum())))
+        left.remove(order[-1])
+    return order
+
+
+def _cross(first: FloatArray, second: FloatArray) -> bool:
+    """Whether two segments on paper, (2, 2) each, cross."""
+    return all(
+        np.linalg.det([end - start, other[0] - start])
+        * np.linalg.det([end - start, other[1] - start])
+        < 0.0
+        for (start, end), other in ((first, second), (second, first))
+    )
 
 
 def scale_bar(view: Projection, unit_mm: float, x: float, y: float) -> Element:
     """Return a scale bar of a round length, labelled in design units and millimetres."""
     length = round_length(130.0 / view.scale)
+    words = f"{format_number(length, 6)} units = {format_number(length * unit_mm, 6)} mm"
+    return bar(x, y, length * view.scale, words)
+
+
+def bar(x: float, y: float, length: float, words: str) -> Element:
+    """Return a bar of a length on paper from (x, y) to the right, with words above it."""
     path = (
         f"M{coordinate(x)},{coordinate(y - 4.0)}v8M{coordinate(x)},{coordinate(y)}"
-        f"h{coordinate(length * view.scale)}m0,-4v8"
+        f"h{coordinate(length, PRECISE)}m0,-4v8"
     )
-    words = f"{format_number(length, 6)} units = {format_number(length * unit_mm, 6)} mm"
     return element("g", element("path", d=path, class_="bar"), drawing_text(words, x, y - 7.0))
 
 
@@ -282,7 +383,9 @@ def _leg(view: Projection, leg: FloatArray) -> list[Element]:
 
 
 def _area(view: Projection, corners: Sequence[FloatArray], class_: str, fill: str) -> Element:
-    return element("path", d=path_of(view.to(np.array(corners))), class_=class_, fill=fill)
+    return element(
+        "path", d=path_of(view.to(np.array(corners)), decimals=PRECISE), class_=class_, fill=fill
+    )
 
 
 def _key(x: float, y: float) -> Iterator[Element]:
@@ -293,7 +396,8 @@ def _key(x: float, y: float) -> Iterator[Element]:
         for name, length in (("rod", 18.0), ("cylinder", 10.0))
     )
     joint, ball = (
-        element("circle", cx=x + 9.0, cy=0.0, r=4.2, class_=name) for name in ("joint", "ball")
+        element("circle", cx=x + 9.0, cy=0.0, r=4.2, class_=name, fill=fill)
+        for name, fill in (("joint", DARK), ("ball", LIGHT))
     )
     entries = (
         (joint, "universal joint, on the base"),

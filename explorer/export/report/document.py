@@ -14,7 +14,7 @@ import numpy as np
 from explorer import __version__
 from explorer.errors import ExplorerError
 from explorer.export.drawings import markup
-from explorer.export.drawings.markup import Piece, Row, element, paragraph, whole
+from explorer.export.drawings.markup import Piece, Row, drawing_style, element, paragraph, whole
 from explorer.export.drawings.mechanism import WIDTH, cover_drawing, svg_drawing
 from explorer.export.drawings.slices import ruler
 from explorer.export.report import mechanism, workspace
@@ -42,7 +42,7 @@ def report_html(data: ReportData, date: dt.date) -> str:
     Equal data give equal reports, except for the date and the versions of the libraries.
     """
     title = f"{_name(data)} – design report"
-    style = packaged_file("export/report", "style.css").read_text("utf-8")
+    style = packaged_file("export/report", "style.css").read_text("utf-8") + drawing_style()
     head = element(
         "head",
         element("meta", charset="utf-8"),

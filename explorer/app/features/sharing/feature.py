@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from html import escape
 
+import numpy as np
 import viser
 
 from explorer.app.browser.downloads import File
@@ -15,12 +16,16 @@ from explorer.app.features.optimise.state import Optimisation
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.features.sharing import scene_files
 from explorer.app.features.sharing.reporting import ReportFormat, make_report
+from explorer.app.scene.camera import has_perspective
+from explorer.app.scene.placing import scene_scale
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import extra_button, open_button, press_button
 from explorer.app.widgets.markup import box
 from explorer.export.controller import kernel_files
+from explorer.export.drawings.figure import COLUMN, PAGE, figure_svg
+from explorer.export.drawings.mechanism import Projection
 from explorer.export.moving_page import moving_page
 from explorer.files.extras import is_missing
 from explorer.files.writing import zip_bytes
@@ -32,6 +37,12 @@ PICTURES: dict[str, tuple[int, int] | float] = {
     "PNG twice as shown": 2.0,
 }
 """Formats of pictures: width and height, or a factor on the size in the browser."""
+FIGURES = {
+    f"SVG {width:g} mm{', black' if black else ''}": (width, black)
+    for black in (False, True)
+    for width in (COLUMN, PAGE)
+}
+"""Forms of figures: the width in millimetres, and whether they are black."""
 REPORTS: dict[str, ReportFormat] = {"HTML": "html", "PDF": "pdf"}
 # Extras that formats need.
 EXTRA_OF_FORMAT = {"STEP": "cad", "PDF": "screenshot"}
@@ -58,6 +69,23 @@ def send_picture(
         return f"{services.session.state.design.name}-{sides[0]}x{sides[1]}.png", data
 
     services.downloads.make(who, "Drawing the picture", make)
+
+
+def send_figure(services: Services, width: float, who: Who, *, black: bool) -> None:
+    """Send the mechanism from the camera of a browser as SVG, as wide as stated, in millimetres."""
+
+    def make(client: viser.ClientHandle) -> File:
+        state = services.session.latest_state()
+        eye, target = (
+            np.asarray(point) / scene_scale(state)
+            for point in (client.camera.position, client.camera.look_at)
+        )
+        view = Projection.of_camera(eye, target, perspective=has_perspective(target - eye))
+        snapshot, tetrahedra = Frame(state).snapshot, state.view.tetrahedra
+        data = figure_svg(snapshot, view, width, black=black, tetrahedra=tetrahedra)
+        return f"{state.design.name}-figure.svg", data
+
+    services.downloads.make(who, "Drawing the figure", make)
 
 
 def send_scene(services: Services, who: Who) -> None:
@@ -197,6 +225,14 @@ SHARING = Feature(
             "The scene with its labels, from your camera.",
             tuple(PICTURES),
             lambda services, name, who: send_picture(services, PICTURES[name], who),
+        ),
+        Export(
+            "Figure",
+            "The mechanism from your camera for a paper, as wide as a column or a page.",
+            tuple(FIGURES),
+            lambda services, name, who: send_figure(
+                services, FIGURES[name][0], who, black=FIGURES[name][1]
+            ),
         ),
         Export(
             "Scene",
