@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import names_page
 import pytest
 from sweep_faults import HereWorkers
 
@@ -33,7 +34,7 @@ from explorer.optimise.problem import OBJECTIVES
 ROOT = Path(__file__).resolve().parents[2]
 MANUAL = Path(explorer.__file__).parents[1] / "assets" / "manual"
 DOCUMENTS = {
-    **{name: ROOT / name for name in ("README.md", "CONTRIBUTING.md")},
+    **{name: ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")},
     **{p.name: p for p in sorted(MANUAL.iterdir())},
 }
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -81,6 +82,15 @@ def test_manual_lists_the_public_names_with_their_rooms() -> None:
     listed = re.findall(r"^\| (\w+) \| `(\w+)` \| .+ \|$", read("python.md"), re.MULTILINE)
     assert sorted(listed) == sorted(public)
     assert {name for _, name in public} == {*explorer.__all__}
+
+
+def test_page_of_the_public_names_is_made_from_their_docstrings() -> None:
+    assert read("names.md") == names_page.page(), "run python tests/tools/names_page.py"
+
+
+def test_changelog_begins_with_the_present_version() -> None:
+    versions = re.findall(r"^## (.+)$", read("CHANGELOG.md"), re.MULTILINE)
+    assert versions[0] == __version__
 
 
 def test_manual_counts_the_objectives_of_the_optimiser() -> None:
