@@ -291,7 +291,7 @@ def _answer(
 
     Joints that do not close have one pose, which is left out.
     """
-    mode, (verdicts, verdict) = mode_of(poses.margins), _verdicts(poses)
+    mode, (words, kind, broken) = mode_of(poses.margins), _verdicts(poses)
     heads, numbers = _columns(poses, len(given), at)
     time = [name for name in ("time",) if name in table.columns]
     known = np.hstack([table.numbers(*time), joints]).tolist()
@@ -300,49 +300,41 @@ def _answer(
     ]
     rows: list[str] = []
     for index, number, row, which in zip(
-        given.tolist(), mode.tolist(), numbers.tolist(), verdict.tolist(), strict=True
+        given.tolist(), mode.tolist(), numbers.tolist(), kind.tolist(), strict=True
     ):
-        broken, words = verdicts[int(which)]
         if closes[index]:
-            values = ",".join([str(number), *map(repr, row), "false" if broken else "true"])
-            rows.append(f"{starts[index]},{values},{words}")
+            values = ",".join([str(number), *map(repr, row), "false" if words[which] else "true"])
+            rows.append(f"{starts[index]},{values},{words[which]}")
         else:
             rows.append(f"{starts[index]},{',' * len(row)},false,{TOO_LONG}")
     within = np.zeros(len(closes), dtype=np.bool_)
-    count = np.array([each.broken for each in verdicts])[verdict]
-    within[given[closes[given] & (count == 0)]] = True
+    within[given[closes[given] & (broken == 0)]] = True
     outside: list[int] = np.flatnonzero(~within).tolist()
     first = (table.lines[outside[0]], TOO_LONG) if outside else None
     if outside and closes[outside[0]]:
         # Of eight modes the one that violates the fewest limits.
-        rows_there: list[int] = np.flatnonzero(given == outside[0]).tolist()
-        best = min(rows_there, key=count.tolist().__getitem__)
-        words = verdicts[int(verdict[best])].words
-        first = table.lines[outside[0]], f"mode {mode[best]} violates {words}"
+        there = np.flatnonzero(given == outside[0])
+        best = int(there[broken[there].argmin()])
+        first = table.lines[outside[0]], f"mode {mode[best]} violates {words[kind[best]]}"
     start = ["line", *(f"{name}_s" for name in time), *length_heads(JOINTS, poses.design.unit_mm)]
     head = [*start, "mode", *heads, "within_limits", "violations"]
     text = "\n".join([",".join(head), *rows, ""])
     return TableAnswer(text, len(closes), int(closes.sum()), int(within.sum()), first)
 
 
-class _Verdict(NamedTuple):
-    """How many limits a pose violates, and their names in the order of the design file."""
+def _verdicts(poses: Configuration) -> tuple[list[str], IntArray, IntArray]:
+    """Return the sets of limits that poses violate, in words, and the set and its size of each.
 
-    broken: int
-    words: str
-
-
-def _verdicts(poses: Configuration) -> tuple[list[_Verdict], IntArray]:
-    """Return the different verdicts on poses, and the index of that of each pose, (m,)."""
+    The words are the names of the limits in the order of the design file. The indices of the sets
+    and their sizes have the shape (m,).
+    """
     demands, _, sides = sides_of_limits(poses)
     ends = np.array([demand.end_names() for demand in demands]).reshape(-1, 2)
     # Poses violate few of all sets of limits, each a number in balanced ternary digits.
-    sets = sides @ 3 ** np.arange(len(demands))
-    _, first, which = np.unique(sets, return_index=True, return_inverse=True)
-    names: list[list[str]] = [
-        ends[side != 0, (side[side != 0] > 0) * 1].tolist() for side in sides[first]
-    ]
-    return [_Verdict(len(each), "; ".join(each)) for each in names], which
+    numbers = sides @ 3 ** np.arange(len(demands))
+    _, first, kind = np.unique(numbers, return_index=True, return_inverse=True)
+    words = ["; ".join(ends[side != 0, (side[side != 0] > 0) * 1]) for side in sides[first]]
+    return words, kind, np.count_nonzero(sides, axis=1)
 
 
 def _columns(poses: Configuration, count: int, at: Point) -> tuple[list[str], FloatArray]:

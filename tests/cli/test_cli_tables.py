@@ -145,6 +145,13 @@ def test_joints_that_do_not_close_are_told_and_the_others_answered(
     assert rows[8]["violations"] == "the lengths do not close"
 
 
+def test_first_line_outside_is_told_with_all_that_it_violates() -> None:
+    answer = answer_to("x_mm,y_mm,z_mm\n100,50,90\n300,50,90\n110,50,90")
+    assert (answer.lines, answer.closing, answer.within) == (3, 3, 2)
+    assert answer.first == (3, "mode 1 violates l1 maximum; box x maximum")
+    assert answer_to("x,y,z\n10,5,9").first is None
+
+
 FAULTS = """
 x_mm,y_mm,z_mm/1,2,3/1,two,3 | line 3, column y_mm: 'two': a number, such as 12.5, is needed
 x_mm;y;z/1;2,5;3/1;2.5.1;3 | line 3, column y: '2.5.1': a number, such as 12,5, is needed
