@@ -23,7 +23,7 @@ NARROWEST, WIDEST = 40.0, 400.0
 # Points of paper in a millimetre, so that letters of a label are 2 mm high.
 PER_MM = 4.0
 # Room for labels beside the mechanism and above it, and below it for scale bar and axes, in points.
-ASIDE, ABOVE, FOOT = 27.0, 20.0, 44.0
+ASIDE, ABOVE, FOOT = 27.0, 20.0, 56.0
 # Largest height of the mechanism as a share of the width.
 MOST_HEIGHT = 0.9
 # Least share of the target's distance at which the eye is from a part.

@@ -167,7 +167,7 @@ def labels(
         overlap = np.maximum(common, 0.0).prod(axis=-1).sum(axis=-1)
         inside = ((covered > lows) & (covered < highs)).all(axis=-1).sum(axis=-1)
         beyond = np.concatenate([within[:2] - low, high - within[2:], np.zeros_like(low)], axis=1)
-        cost = overlap + 4.0 * inside + 50.0 * beyond.max(axis=1) + 0.4 * distance
+        cost = overlap + 4.0 * inside + 50.0 * beyond.max(axis=1) + 1.2 * distance
         best = int(cost.argmin())
         taken.append(np.concatenate([low[best], high[best]]))
         x, y = float(middle[best, 0]), float(high[best, 1]) - 2.5
