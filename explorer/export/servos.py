@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import NoAnswerError
@@ -19,6 +20,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, STRUT_ROWS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.weights import Mass, machine_weights, total_mass
 from explorer.statics.compliance import softness_with_struts
@@ -59,6 +61,12 @@ class Servos(NamedTuple):
         lag = (self.weights - self.forces) / (1e-3 * design.unit_mm * self.stiffness)
         twists = twists_of_actuators(Configuration.at(design, home, design.tool.position))
         return twists @ -lag
+
+
+def droop_text(displacement: ArrayLike, turn: ArrayLike) -> str:
+    """Return the droop in words, given the vectors (3,) in millimetres and in degrees."""
+    moved, turned = (format_number(float(np.linalg.norm(v)), 3) for v in (displacement, turn))
+    return f"at home the weights move the tool by {moved} mm and {turned}°"
 
 
 class Strokes(NamedTuple):

@@ -6,7 +6,7 @@ reference configuration. Six position servos move the actuators, see `explorer.e
 
 The model can be part of a scene: it has no option of the whole scene. Angles are zero at home and
 limited by tendons, so that the scene may count them in degrees or radians. Gravity is that of the
-scene, downwards; a frame turns a base that stands otherwise.
+scene, downwards; the body `base` is turned if the design has gravity in another direction.
 
 MuJoCo's loops give way by a share of what the bodies at their ends would do apart from each other.
 A `connect` ends at a socket on the rod, a body of hardly any mass about the base joint, so that
@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 
 from explorer import __version__
 from explorer.errors import InputError
-from explorer.export.servos import servos_of, strokes_of, with_payload
+from explorer.export.servos import droop_text, servos_of, strokes_of, with_payload
 from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.machine import Guide
 from explorer.numerics.arrays import FloatArray
@@ -180,11 +180,18 @@ class SimulationModel:
 
     def text(self) -> str:
         """Return the model as XML."""
-        root = ET.Element("mujoco", model=self.design.name)
+        droop = self.servos.droop(self.design)
+        # Drake ends at a model without a name.
+        root = ET.Element("mujoco", model=self.design.name or "untitled")
         root.append(
             _comment(
                 f"flagged-explorer {__version__}; metres, kilograms, radians",
                 f"one design unit is {self.design.unit_mm:g} mm",
+                "a servo has the force k (ctrl - q) + f, less damping: q is its joint's value in",
+                "metres, k its stiffness (in gainprm), f its force at home (in biasprm)",
+                "begin at the keyframe home, or set each ctrl to q of new data: a ctrl of zero",
+                "asks for a leg of no length",
+                droop_text(1e3 * self.metres * droop[:3], np.degrees(droop[3:])),
                 f"left out: {'; '.join(self.left_out)}",
             )
         )
@@ -213,12 +220,13 @@ class SimulationModel:
 
     def _bodies(self, world: ET.Element) -> None:
         design, metres = self.design, self.metres
+        base = _add(world, "body", name="base", childclass=CLASS)
         if design.gravity != DOWN:
-            # The rotation that turns the direction of gravity downwards.
+            # The rotation that turns the direction of gravity downwards. Pinocchio and Drake do not
+            # read frames, which could have it too.
             x, y, z = design.gravity
             turn = [1.0 - z, -y, x, 0.0] if (x, y) != (0.0, 0.0) else [0.0, 1.0, 0.0, 0.0]
-            world = _add(world, "frame", quat=turn)
-        base = _add(world, "body", name="base", childclass=CLASS)
+            base.set("quat", _text(np.array(turn) / np.linalg.norm(turn)))
         low, high = design.limits.guide or (0.0, design.a2x)
         thin = min(self.radii[1:3])
         if high > low:

@@ -168,6 +168,7 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     text = cli.text(*words)
     for line in ("seed 7", "tool at home off by", f"weights move the tool by {moved:.3g} mm and "):
         assert line in text
+    assert f"the tool by {moved:.3g} mm" in out.read_text(encoding="utf-8")
 
 
 def test_export_kernel_writes_a_folder_and_page_a_file(cli: CommandLine, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from limited_designs import limited
 from machines import FULL, OPTIMAL, PRESS
-from mujoco_models import at_home, engine, loops_of
+from mujoco_models import at_home, engine, joints_of, loops_of
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from statics_cases import random_poses
@@ -23,11 +23,10 @@ from explorer import (
     Payload,
     Pose,
     Tool,
-    actuator_forces,
+    inverse,
     tool_position,
 )
 from explorer.export.simulation import DENSITY, SimulationModel, simulation_mjcf
-from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN, LENGTHS, Swing
 from explorer.mechanism.design_file import typical_machine
 from explorer.mechanism.machine import STANDARD_GRAVITY
@@ -36,7 +35,7 @@ from explorer.prototype.chains import ACTUATED
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.prototype.weights import bar_masses, machine_weights
 from explorer.statics.accuracy import SOURCES
-from explorer.statics.weights import carry
+from explorer.statics.loaded import LoadedPose
 
 UNLIMITED = msgspec.structs.replace(
     PRESS, actuators=Actuators(), tool=Tool((1, 0, 2), (1, 1, 0, 1))
@@ -109,7 +108,8 @@ def loaded(seed: int) -> Design:
     )
 
 
-LOADED = [UNLIMITED, OPTIMAL, *map(loaded, range(3))]
+HUNG = msgspec.structs.replace(UNLIMITED, gravity=(0, 0, 1))
+LOADED = [UNLIMITED, OPTIMAL, HUNG, *map(loaded, range(3))]
 
 
 @pytest.mark.parametrize(("ahead", "behind"), HOSTS)
@@ -180,25 +180,34 @@ BODIES = [(design, "bars") for design in LOADED] + [(UNLIMITED, "parts"), (OPTIM
 
 
 @pytest.mark.parametrize(("design", "masses"), BODIES, ids=range(len(BODIES)))
-def test_servos_at_rest_give_the_forces_of_statics_at_home(design: Design, masses: str) -> None:
+def test_servos_at_rest_give_the_forces_of_statics(design: Design, masses: str) -> None:
     found = bar_masses(design, DENSITY)
     if masses == "parts":
         found = make_prototype(design).masses(2700.0)
-    model = model_of(simulation_mjcf(design, masses=found))
-    data = at_home(model)
-    start = data.site("tool").xpos.copy(), data.site("tool").xmat.reshape(3, 3).copy()
-    home = design.home_pose
-    given = design, home.position, home.rotation
-    forces = actuator_forces(
-        *given, carry(Configuration(*given), machine_weights(design, found)).wrench
-    )
-    rest(model, data)
-    assert_allclose(data.actuator_force, forces, atol=1e-3 * np.abs(forces).max())
-    # Nothing droops, but for what the loops give way in steps of 2 ms.
-    reach = 1e-3 * design.unit_mm * design.reach
-    assert np.linalg.norm(data.site("tool").xpos - start[0]) < 1e-4 * reach
-    turn = Rotation.from_matrix(data.site("tool").xmat.reshape(3, 3) @ start[1].T)
-    assert turn.magnitude() < 1e-4
+    given = SimulationModel(design, masses=found)
+    model = model_of(given.text())
+    weights = machine_weights(design, found, payload=False)
+    home, metres = design.home_pose, 1e-3 * design.unit_mm
+    rng = np.random.default_rng(5)
+    for share in (0.0, 0.05, 0.05):
+        position = np.array(home.position) + share * design.reach * rng.uniform(-1.0, 1.0, 3)
+        turn = Rotation.from_rotvec(2.0 * share * rng.normal(size=3)).as_matrix()
+        pose = Pose.of(position, home.rotation @ turn)
+        forces = LoadedPose(design, pose, own=weights).reactions.actuators
+        data = engine.MjData(model)
+        data.qpos[:] = joints_of(design, position, pose.rotation)
+        data.ctrl[:] = metres * inverse(design, position, pose.rotation)
+        data.ctrl[:] += (forces - given.servos.forces) / given.servos.stiffness
+        engine.mj_forward(model, data)
+        start = data.site("tool").xpos.copy(), data.site("tool").xmat.reshape(3, 3).copy()
+        tool = data.body("base").xmat.reshape(3, 3) @ tool_position(pose, design.tool.position)
+        assert_allclose(start[0], metres * tool, atol=1e-12 * metres * design.reach)
+        rest(model, data)
+        assert_allclose(data.actuator_force, forces, atol=1e-3 * np.abs(forces).max())
+        # Nothing droops, but for what the loops give way in steps of 2 ms.
+        assert np.linalg.norm(data.site("tool").xpos - start[0]) < 1e-4 * metres * design.reach
+        turned = Rotation.from_matrix(data.site("tool").xmat.reshape(3, 3) @ start[1].T)
+        assert turned.magnitude() < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -218,24 +227,33 @@ def test_servos_are_stable_for_time_steps_and_integrators(integrator: str, times
         assert_allclose(data.qpos[list(ACTUATED)], data.ctrl, atol=1e-2 * reach)
 
 
-def test_servos_upside_down_bear_the_weights_of_a_ceiling() -> None:
-    design = UNLIMITED
-    host = engine.MjSpec()
-    frame = host.worldbody.add_frame(pos=[0.0, 0.0, 3.0], quat=[0.0, 1.0, 0.0, 0.0])
-    frame.attach_body(engine.MjSpec.from_string(simulation_mjcf(design)).body("base"), "m-", "")
-    model = host.compile()
-    model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
-    data = at_home(model, "m-home")
-    rest(model, data)
-    turn = np.diag([1.0, -1.0, -1.0])
-    platform = data.body("m-platform")
-    position = turn @ (platform.xpos - [0.0, 0.0, 3.0]) * 1e3 / design.unit_mm
-    rotation = turn @ platform.xmat.reshape(3, 3)
-    hung = msgspec.structs.replace(design, gravity=(0.0, 0.0, 1.0))
-    weights = machine_weights(hung, bar_masses(design, DENSITY))
-    wrench = carry(Configuration(hung, position, rotation), weights).wrench
-    forces = actuator_forces(hung, position, rotation, wrench)
-    assert_allclose(data.actuator_force, forces, atol=1e-3 * np.abs(forces).max())
+@pytest.mark.parametrize("design", LOADED)
+def test_machines_on_a_flange_a_ceiling_and_behind_other_bodies_start_closed(
+    design: Design,
+) -> None:
+    arm = f"""<mujoco><asset><model name="guest" file="{FILE}"/></asset>{DEFAULTS}<worldbody>
+    <body name="arm" pos="0 0 1"><joint name="arm" axis="0 1 0"/><geom size="0.1"/>
+    <frame pos="0.1 0 0.2" euler="20 30 40"><attach model="guest" body="base" prefix="flange-"/>
+    </frame></body><frame pos="0 0 3" quat="0 1 0 0">
+    <attach model="guest" body="base" prefix="ceiling-"/></frame></worldbody></mujoco>"""
+    behind = f'<mujoco>{THINGS}<include file="{FILE}"/></mujoco>'
+    machine = simulation_mjcf(design)
+    alone = at_home(model_of(machine))
+    expected = alone.body("base").xmat.reshape(3, 3).T @ alone.body("platform").xpos
+    for host, prefixes in ((arm, ("flange-", "ceiling-")), (behind, ("",))):
+        model = model_of(host, machine)
+        data = engine.MjData(model)
+        # Whatever moves the flange, the loops stay closed.
+        data.joint(0).qpos[0] += 0.7
+        for state in (data, *(at_home(model, f"{prefix}home") for prefix in prefixes if prefix)):
+            engine.mj_forward(model, state)
+            loops = np.array(state.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
+            assert loops.sum() == 9 * len(prefixes)
+            assert np.abs(np.array(state.efc_pos)[loops]).max() < 1e-9
+            for prefix in prefixes:
+                base, platform = (state.body(prefix + name) for name in ("base", "platform"))
+                found = base.xmat.reshape(3, 3).T @ (platform.xpos - base.xpos)
+                assert_allclose(found, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -278,28 +296,6 @@ def test_servos_push_and_pull_up_to_their_limits() -> None:
     model = model_of(simulation_mjcf(msgspec.structs.replace(PRESS, actuators=pulls_only)))
     assert (model.actuator_forcerange[:, 0] == [-3, -2, -3, -2, -3, -3]).all()
     assert (model.actuator_forcerange[:, 1] >= 1e9).all()
-
-
-def test_payload_and_tool_are_those_of_the_design() -> None:
-    for design in LOADED:
-        model = model_of(simulation_mjcf(design))
-        data = at_home(model)
-        masses = bar_masses(design, DENSITY)
-        payload, metres = design.payload, 1e-3 * design.unit_mm
-        platform = data.body("platform")
-        bare = masses["platform"]
-        total = bare.mass + payload.mass_kg
-        centre = (
-            bare.mass * bare.centre + payload.mass_kg * metres * np.array(payload.centre)
-        ) / total
-        assert model.body("platform").mass[0] == pytest.approx(total)
-        assert_allclose(model.body("platform").ipos, centre, atol=1e-12 * metres * design.reach)
-        moving = sum(each.mass for each in masses.values()) + payload.mass_kg
-        assert float(model.body_mass.sum()) == pytest.approx(moving)
-        tool = platform.xpos + platform.xmat.reshape(3, 3) @ (
-            metres * np.array(design.tool.position)
-        )
-        assert_allclose(data.site("tool").xpos, tool, atol=1e-12 * metres * design.reach)
 
 
 def test_limits_that_home_exceeds_end_at_home() -> None:

@@ -14,6 +14,7 @@ import sys
 import tomllib
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,8 @@ INLINE = re.compile(r"`(explorer(?: [^`]+)?)`")
 NO_ANSWER = "# ends with status 1"
 # The address of the scheduler that the manual names, which is another machine's.
 SCHEDULER = "10.0.0.1:8786"
+# Readers of exported files, whose examples run where they are installed.
+OTHER_READERS = {"pinocchio", "pydrake"}
 # Documents whose claims are measured, and compared with the page, in tests/reproduce.
 MEASURED = ("README.md", "claims.md")
 
@@ -180,7 +183,9 @@ class Reader:
             printed = [self.enter(line) for line in text.replace("\\\n", " ").splitlines()]
             self.output = None if None in printed else "".join(map(str, printed))
         elif kind == "python":
-            exec(compile(text, f"{self.name}, a block", "exec"), self.names)
+            imported = re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE)
+            if all(find_spec(name) for name in OTHER_READERS.intersection(imported)):
+                exec(compile(text, f"{self.name}, a block", "exec"), self.names)
         elif kind == "text":
             for line in text.splitlines() if self.output is not None else ():
                 assert line in str(self.output).splitlines(), line

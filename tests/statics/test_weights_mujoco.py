@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from mujoco_models import engine, joints_of
+from mujoco_models import engine, joints_of, loops_of
 from numpy.testing import assert_allclose
 from statics_cases import random_poses
 
@@ -16,7 +16,6 @@ from explorer.export.simulation import DENSITY, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN, VARIABLES
 from explorer.mechanism.machine import STANDARD_GRAVITY
-from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.weights import bar_masses, machine_weights
 from explorer.statics.weights import carry
@@ -41,13 +40,6 @@ def apply_load(design: Design, model: Any, data: Any) -> None:
     force, moment = base @ LOAD[:3], base @ (metres * LOAD[3:])
     data.qfrc_applied[:] = 0.0
     engine.mj_applyFT(model, data, force, moment, point, platform.id, data.qfrc_applied)
-
-
-def loops_of(model: Any, data: Any) -> FloatArray:
-    """Return the Jacobian (9, 15) of the ball joints."""
-    own = np.array(data.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
-    dense = np.array(data.efc_J).reshape(data.nefc, model.nv)
-    return dense[own]
 
 
 def random_design(seed: int) -> Design:
@@ -84,7 +76,7 @@ def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design)
         apply_load(design, model, data)
         # What weights and load leave to the servos and to the ball joints.
         needed = np.array(data.qfrc_bias) - np.array(data.qfrc_applied)
-        columns = np.concatenate([np.eye(model.nv)[list(ACTUATED)], loops_of(model, data)]).T
+        columns = np.concatenate([np.eye(model.nv)[list(ACTUATED)], loops_of(model, data)[1]]).T
         forces = np.linalg.solve(columns, needed)[:6]
         wrench = LOAD + carry(Configuration(design, position, rotation, TOOL), weights).wrench
         ours = actuator_forces(design, position, rotation, wrench, TOOL)

@@ -20,12 +20,12 @@ from explorer.export.controller import kernel_files
 from explorer.export.drawings.figure import COLUMN, figure_svg
 from explorer.export.drawings.mechanism import Projection, ViewName, points_to_show
 from explorer.export.moving_page import moving_page
+from explorer.export.servos import droop_text
 from explorer.files.extras import check_extra
 from explorer.files.writing import check_writable, make_folder, write_whole
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.statics import accuracy
@@ -359,9 +359,7 @@ def _simulation_lines(facts: Mapping[str, Any]) -> Iterator[str]:
     columns = (output.figures(facts[key]) for key in keys)
     head = ("servo", "stiffness, N/mm", "force at home, N", "rotor, kg")
     yield output.table([head, *zip(JOINTS, *columns, strict=True)], "<>>>")
-    displacement, turn = (math.hypot(*each) for each in facts["droop"].values())
-    droop = f"{format_number(displacement, 3)} mm and {format_number(turn, 3)}°"
-    yield f"at home the weights move the tool by {droop}"
+    yield droop_text(*facts["droop"].values())
     yield f"left out: {', '.join(facts['left_out'])}"
 
 

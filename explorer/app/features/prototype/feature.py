@@ -269,7 +269,7 @@ PROTOTYPE = Feature(
         ),
         Export(
             "Simulation",
-            "A model with joints, masses and servos for MuJoCo and other physics engines.",
+            "A model for MuJoCo and other engines, with servos that bear the weights at home.",
             ("MJCF",),
             _send_simulation,
         ),
