@@ -27,6 +27,7 @@ from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import View
 from explorer.export.controller import kernel_files
+from explorer.export.linuxcnc import linuxcnc_files
 from explorer.export.moving_page import moving_page
 from explorer.numerics.arrays import FloatArray
 
@@ -113,15 +114,19 @@ def test_picture_has_the_size_and_background_that_are_set_and_no_handle(tab: Tab
     assert found.structure < 0.05
 
 
-def test_moving_page_and_kernel_are_those_of_the_design(tab: Tab) -> None:
+def test_moving_page_kernel_and_configuration_are_those_of_the_design(tab: Tab) -> None:
     download = tab.export("Moving page", "HTML")
     assert download.suggested_filename == "paper-optimal-moving.html"
     assert download.path().read_bytes() == moving_page(tab.state.design)
-    download = tab.export("Kernel for controllers", "C (zip)")
-    assert download.suggested_filename == "paper-optimal-kernel.zip"
-    with zipfile.ZipFile(download.path()) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
-    assert files == kernel_files(tab.state.design)
+    for title, file_format, name, make in (
+        ("Kernel for controllers", "C (zip)", "kernel", kernel_files),
+        ("Configuration for LinuxCNC", "INI (zip)", "linuxcnc", linuxcnc_files),
+    ):
+        download = tab.export(title, file_format)
+        assert download.suggested_filename == f"paper-optimal-{name}.zip"
+        with zipfile.ZipFile(download.path()) as archive:
+            files = {name: archive.read(name) for name in archive.namelist()}
+        assert files == make(tab.state.design)
 
 
 # Where the page's camera sees points of the scene: its own matrices, as they draw the next frame.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from command_line import CommandLine
 import explorer
 from explorer.cli import run
 from explorer.export.controller import kernel_files
+from explorer.export.linuxcnc import linuxcnc_files
 from explorer.export.mesh import FORMATS
 from explorer.export.moving_page import moving_page
 from explorer.export.simulation import simulation_mjcf
@@ -171,16 +173,26 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     assert f"the tool by {moved:.3g} mm" in out.read_text(encoding="utf-8")
 
 
-def test_export_kernel_writes_a_folder_and_page_a_file(cli: CommandLine, tmp_path: Path) -> None:
-    folder, page = tmp_path / "new" / "kernel", tmp_path / "page.html"
+@pytest.mark.parametrize(
+    ("what", "file_format", "make"),
+    [("kernel", "c", kernel_files), ("linuxcnc", "ini", linuxcnc_files)],
+)
+def test_export_of_software_writes_a_folder(
+    cli: CommandLine, tmp_path: Path, what: str, file_format: str, make: Callable[..., Any]
+) -> None:
+    folder, files = tmp_path / "new" / what, make(OPTIMAL)
     for _ in range(2):
-        answer = cli.answer("kernel", "--out", folder)
-        names = ["flagged44.h", "flagged44.c"]
-        assert answer == {"file": str(folder), "format": "c", "files": names}
-        assert {each.name: each.read_bytes() for each in folder.iterdir()} == kernel_files(OPTIMAL)
+        answer = cli.answer(what, "--out", folder)
+        assert answer == {"file": str(folder), "format": file_format, "files": list(files)}
+        assert {each.name: each.read_bytes() for each in folder.iterdir()} == files
+    reason = f"there is {file_format}"
+    assert reason in cli.refusal(what, "--out", folder, "--format", "zip")
+
+
+def test_export_page_writes_a_file(cli: CommandLine, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
     assert cli.answer("page", "--out", page)["bytes"] == len(page.read_bytes())
     assert page.read_bytes() == moving_page(OPTIMAL)
-    assert "there is c" in cli.refusal("kernel", "--out", folder, "--format", "zip")
     assert "folder" in cli.refusal("kernel", "--out", page)
 
 

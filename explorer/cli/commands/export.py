@@ -19,6 +19,7 @@ from explorer.export import assembly, mesh, simulation, step
 from explorer.export.controller import kernel_files
 from explorer.export.drawings.figure import COLUMN, figure_svg
 from explorer.export.drawings.mechanism import Projection, ViewName, points_to_show
+from explorer.export.linuxcnc import linuxcnc_files
 from explorer.export.moving_page import moving_page
 from explorer.export.servos import droop_text
 from explorer.files.extras import check_extra
@@ -32,7 +33,9 @@ from explorer.statics import accuracy
 from explorer.workspace.solids.solid import convex_hull
 from explorer.workspace.solids.solids import workspace_solid
 
-What = Literal["workspace", "hull", "mechanism", "simulation", "scene", "page", "figure", "kernel"]
+What = Literal[
+    "workspace", "hull", "mechanism", "simulation", "scene", "page", "figure", "kernel", "linuxcnc"
+]
 
 # Typical width of a browser window over its height.
 ASPECT = 1.6
@@ -41,7 +44,7 @@ OF_ALL = ("what", "out", "format", "design", "json")
 
 @dataclass(frozen=True, kw_only=True)
 class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
-    """Write the workspace, the mechanism, its models, pages, a figure or the kernel as files.
+    """Write the workspace, the mechanism, its models, pages, a figure or software as files.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
@@ -51,7 +54,8 @@ class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     browser, the figure an SVG for a paper with letters and lines of a fixed size, both in the home
     pose unless a pose is given. The page is a smaller file whose mechanism moves, with sliders for
     pose, joints and folds. The kernel is a folder with the kinematics of the design as C99 source,
-    for controllers. With `--at tool` the workspace and the hull are those of the tool point, with
+    for controllers; linuxcnc is a folder with it as a configuration that runs in LinuxCNC's
+    simulation. With `--at tool` the workspace and the hull are those of the tool point, with
     `--load` those of the positions that hold the load.
     """
 
@@ -59,13 +63,13 @@ class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     """Object to write."""
 
     out: Path
-    """File to write, of a kernel the folder; an existing one is replaced."""
+    """File to write, of kernel and linuxcnc the folder; an existing one is replaced."""
 
     format: Annotated[
         str | None,
         values.hint(
             "default: the suffix of the file",
-            "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html|svg|c",
+            "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html|svg|c|ini",
         ),
     ] = None
     """Format; 3mf has unit, names, colours, ply and obj doubles, step (extra `cad`) exact faces."""
@@ -293,8 +297,15 @@ def _figure(command: Export, file_format: str) -> tuple[bytes, Facts]:
     return data, {"format": "svg", "bytes": len(data)}
 
 
+def _linuxcnc(command: Export, file_format: str) -> tuple[dict[str, bytes], Facts]:
+    if file_format != "ini":
+        raise InputError(f"no format {file_format!r} of the configuration; there is ini")
+    files = linuxcnc_files(command.read_design())
+    return files, {"format": "ini", "files": list(files)}
+
+
 _ORIENTATION = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
-_FOLDERS = {"kernel": "c"}
+_FOLDERS = {"kernel": "c", "linuxcnc": "ini"}
 """The format of each object that is a folder of files."""
 _WRITERS: dict[What, tuple[Callable[[Export, str], tuple[Data, Facts]], tuple[str, ...]]] = {
     "workspace": (_mesh, ("tolerance", "load", *_ORIENTATION)),
@@ -308,6 +319,7 @@ _WRITERS: dict[What, tuple[Callable[[Export, str], tuple[Data, Facts]], tuple[st
         ("position", "folds", *_ORIENTATION, "view", "width", "black", "tetrahedra"),
     ),
     "kernel": (_kernel, ()),
+    "linuxcnc": (_linuxcnc, ()),
 }
 """The function that writes each object, and its options besides those of all."""
 

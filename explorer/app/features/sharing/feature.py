@@ -26,6 +26,7 @@ from explorer.app.widgets.markup import box
 from explorer.export.controller import kernel_files
 from explorer.export.drawings.figure import COLUMN, PAGE, figure_svg
 from explorer.export.drawings.mechanism import Projection
+from explorer.export.linuxcnc import linuxcnc_files
 from explorer.export.moving_page import moving_page
 from explorer.files.extras import is_missing
 from explorer.files.writing import zip_bytes
@@ -127,6 +128,16 @@ def send_kernel(services: Services, who: Who) -> None:
     design = services.session.latest_state().design
     data = zip_bytes(kernel_files(design))
     services.downloads.send(who, f"{design.name}-kernel.zip", data)
+
+
+def send_linuxcnc(services: Services, who: Who) -> None:
+    """Send the configuration of the design for LinuxCNC as a ZIP archive."""
+    design = services.session.latest_state().design
+
+    def make(_: viser.ClientHandle) -> File:
+        return f"{design.name}-linuxcnc.zip", zip_bytes(linuxcnc_files(design))
+
+    services.downloads.make(who, "Writing the configuration", make)
 
 
 class ExportDialog:
@@ -251,6 +262,12 @@ SHARING = Feature(
             "Kinematics and limits of the design as C99 source, in millimetres.",
             ("C (zip)",),
             lambda services, _, who: send_kernel(services, who),
+        ),
+        Export(
+            "Configuration for LinuxCNC",
+            "Kinematics, limits and home of the design, to run in simulation at first.",
+            ("INI (zip)",),
+            lambda services, _, who: send_linuxcnc(services, who),
         ),
     ),
 )

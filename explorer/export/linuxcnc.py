@@ -1,0 +1,168 @@
+"""The configuration for LinuxCNC: kinematics around the kernel, HAL and INI files and a README.
+
+The templates in the folder `linuxcnc` hold everything but the numbers of the design.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from string import Template
+
+import numpy as np
+
+from explorer import __version__
+from explorer.errors import NoAnswerError
+from explorer.export.controller import LIMIT_NAMES, kernel_files, read_template
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import GUIDE_ROWS, JOINTS, Design
+from explorer.mechanism.kinematics import inverse
+from explorer.mechanism.margins import margins, mode_of
+from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.valid_poses import poses_are_valid, violations
+
+LINUXCNC_FILES = (
+    *("README.txt", "flagged44.ini", "flagged44.hal", "flagged44.tbl"),
+    "flagged44kins.comp",
+)
+"""The files besides those of the kernel."""
+
+AXES = "XYZABC"
+
+# Ranges of A, B and C in degrees. Beyond ±90 the angle B repeats poses; A and C may go on beyond a
+# half turn.
+ANGLES = ((-360.0, 360.0), (-90.0, 90.0), (-360.0, 360.0))
+
+# Seconds in which X, Y and Z cross the reach, and in which they gather speed.
+CROSSING, GATHERING = 8.0, 0.1
+
+# A joint moves as fast as X, Y and Z jogged at once, and the farthest turn of the platform.
+JOINT_OVER_AXIS = 3.0
+
+
+def linuxcnc_files(design: Design) -> dict[str, bytes]:
+    """Return the files of the configuration of a design, with its kernel, by their names.
+
+    Raises:
+        NoAnswerError: The home pose, in which LinuxCNC begins, breaks limits.
+    """
+    _check_home(design)
+    pose, unit = design.home_pose, design.unit_mm
+    home = unit * inverse(design, pose.position, pose.rotation)
+    angles = yaw_pitch_roll_from_rotation(pose.rotation)[::-1]
+    world = list(map(_number, (*(unit * np.array(pose.position)), *angles)))
+    axes, joints = axis_ranges(design), joint_ranges(design)
+    linear, angular = axis_speeds(design)
+    speeds = 3 * [linear] + 3 * [angular]
+    fields = {
+        "name": design.name,
+        "version": __version__,
+        "mode": mode_of(margins(pose.position, pose.rotation)),
+        "signs": ", ".join("positive" if sign > 0 else "negative" for sign in design.home_signs),
+        "names": "\n".join(f'    "{name.lower().replace("_", " ")}",' for name in LIMIT_NAMES),
+        "home": " ".join(world),
+        "move": " ".join(map("".join, zip(AXES, world, strict=True))),
+        "linear": _number(linear),
+        "angular": _number(angular),
+        "jog": _number(linear / 2.0),
+        "jog_angular": _number(angular / 2.0),
+        "feed": _number(30.0 * linear),
+        "joint": _number(JOINT_OVER_AXIS * linear),
+        "linear_acceleration": _number(linear / GATHERING),
+        "angular_acceleration": _number(angular / GATHERING),
+        "axis_rows": _table(AXES, axes, world),
+        "joint_rows": _table(JOINTS, joints, map(_number, home)),
+        "axis_sections": "\n".join(
+            f"[AXIS_{axis}]\n{_range_lines(row, speed)}"
+            for axis, row, speed in zip(AXES, axes, speeds, strict=True)
+        ),
+        "joint_sections": "\n".join(
+            f"[JOINT_{index}]\n# {name}\nTYPE = LINEAR\n"
+            f"{_range_lines(row, JOINT_OVER_AXIS * linear)}"
+            f"HOME = {_number(at)}\nHOME_OFFSET = {_number(at)}\nHOME_SEQUENCE = 0\n"
+            for index, (name, row, at) in enumerate(zip(JOINTS, joints, home, strict=True))
+        ),
+    }
+    own = {
+        name: Template(read_template(f"linuxcnc/{name}.in")).substitute(fields).encode()
+        for name in LINUXCNC_FILES
+    }
+    return own | kernel_files(design)
+
+
+def axis_ranges(design: Design) -> FloatArray:
+    """Return the ranges of X, Y and Z in mm and of A, B and C in degrees, shape (6, 2).
+
+    Without a box of the design, X, Y and Z have the ranges in which b4 stays with the longest legs
+    1 and 4, whatever the orientation.
+    """
+    if design.limits.box is not None:
+        lows, highs = np.array(design.limits.box)
+    else:
+        from_a1 = design.length_range("l1")[1] + math.hypot(*design.b1)
+        from_a3, a3 = design.length_range("l4")[1], np.array((*design.a3, 0.0))
+        lows = np.maximum(-from_a1, a3 - from_a3)
+        highs = np.minimum(from_a1, a3 + from_a3)
+    return np.vstack([design.unit_mm * np.column_stack([lows, highs]), ANGLES])
+
+
+def joint_ranges(design: Design) -> FloatArray:
+    """Return the ranges of the joints in mm, shape (6, 2).
+
+    Without a range of the guide, a carriage has the one that no pose within the axes leaves.
+    """
+    ranges = np.empty((len(JOINTS), 2))
+    low, high = axis_ranges(design)[0] / design.unit_mm
+    for index, name in enumerate(JOINTS):
+        if index not in GUIDE_ROWS:
+            ranges[index] = design.length_range(name)
+        elif design.limits.guide is not None:
+            ranges[index] = design.limits.guide
+        else:
+            radius = abs(design.b2 if name == "d1" else design.b3)
+            ranges[index] = low - radius, high + radius
+    return design.unit_mm * ranges
+
+
+def axis_speeds(design: Design) -> tuple[float, float]:
+    """Return speeds of X, Y and Z in mm/s and of A, B and C in degrees/s, to begin with.
+
+    The three angles together move no point of the platform faster than the linear speed.
+    """
+    linear = float(f"{design.unit_mm * design.reach / CROSSING:.2g}")
+    radius = design.unit_mm * float(np.linalg.norm(design.platform_points, axis=1).max())
+    return linear, float(f"{math.degrees(linear / (3.0 * radius)):.2g}")
+
+
+def _check_home(design: Design) -> None:
+    pose = design.home_pose
+    if poses_are_valid(design, pose.position, pose.rotation):
+        return
+    at = Configuration(design, pose.position, pose.rotation)
+    broken = [each.words(design.millimetres) for each in violations(at)[0]]
+    raise NoAnswerError(
+        f"LinuxCNC begins in the home pose, which breaks limits: "
+        f"{'; '.join(broken) or 'its legs collide'}. Choose a home pose within the limits"
+    )
+
+
+def _number(value: float) -> str:
+    """Return millimetres or degrees without noise, to a millionth."""
+    return f"{round(value, 6) + 0.0:.12g}"
+
+
+def _range_lines(row: FloatArray, speed: float) -> str:
+    low, high = map(_number, row)
+    return (
+        f"MIN_LIMIT = {low}\nMAX_LIMIT = {high}\n"
+        f"MAX_VELOCITY = {_number(speed)}\nMAX_ACCELERATION = {_number(speed / GATHERING)}\n"
+    )
+
+
+def _table(names: Iterable[str], ranges: FloatArray, home: Iterable[str]) -> str:
+    """Return rows of a text: the name, the least value, that at home, the greatest."""
+    return "\n".join(
+        f"    {name:<2}{_number(low):>14}{at:>14}{_number(high):>14}"
+        for name, (low, high), at in zip(names, ranges, home, strict=True)
+    )

@@ -1,0 +1,202 @@
+"""The configuration for LinuxCNC: limits of the design, and kinematics that are Python's."""
+
+from __future__ import annotations
+
+import configparser
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from compiled_kernel import COMPILER, SANITIZED, CompiledKernel, compile_c
+from exported_designs import in_mm, limited_design, poses_about_home, size_of
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from explorer import PRESETS, Design, forward, inverse, jacobian
+from explorer.errors import NoAnswerError
+from explorer.export.controller import LIMIT_NAMES
+from explorer.export.linuxcnc import axis_speeds, linuxcnc_files
+from explorer.mechanism.design import JOINTS, LENGTHS
+from explorer.mechanism.margins import margins, mode_of
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.workspace.limits.valid_poses import poses_are_valid
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+compiled = pytest.mark.skipif(COMPILER is None, reason="no C compiler `cc` on this machine")
+
+OPTIMAL = PRESETS["paper-optimal"]
+DESIGNS = {
+    **PRESETS,
+    "limited": limited_design(0),
+    "open": OPTIMAL.with_limits(box=None),
+    "guide": msgspec.structs.replace(OPTIMAL.with_limits(guide=(2.0, 19.0)), unit_mm=0.7),
+}
+SUPPORT = Path(__file__).parents[1] / "support" / "linuxcnc"
+OF_LINUXCNC = ("X", "Y", "Z", "D1", "D3", *(name.upper() for name in LENGTHS))
+
+
+class Component:
+    """The component of a design, compiled around stubs of LinuxCNC, over n rows."""
+
+    def __init__(self, design: Design, folder: Path) -> None:
+        files = linuxcnc_files(design)
+        (folder / "flagged44.h").write_bytes(files["flagged44.h"])
+        (folder / "flagged44.c").write_bytes(files["flagged44.c"])
+        (folder / "flagged44kins.c").write_bytes(files["flagged44kins.comp"].split(b"\n;;\n")[1])
+        sources, options = [SUPPORT / "kinematics_rows.c"], ("-shared", "-fPIC", f"-I{SUPPORT}")
+        library = compile_c(folder / "kinematics.so", sources, *SANITIZED, *options)
+        self.library = ctypes.CDLL(str(library))
+
+    @property
+    def message(self) -> str:
+        return (ctypes.c_char * 600).in_dll(self.library, "message").value.decode()
+
+    def inverse(self, worlds: FloatArray) -> tuple[FloatArray, IntArray]:
+        return self._run("inverse_rows", worlds, np.full((len(worlds), 6), np.nan))
+
+    def forward(self, joints: FloatArray, before: FloatArray) -> tuple[FloatArray, IntArray]:
+        return self._run("forward_rows", joints, before.copy())
+
+    def _run(
+        self, function: str, given: FloatArray, out: FloatArray
+    ) -> tuple[FloatArray, IntArray]:
+        results: np.ndarray[Any, Any] = np.empty(len(given), dtype=np.intc)
+        given = np.ascontiguousarray(given)
+        pointers = (each.ctypes.data_as(ctypes.c_void_p) for each in (given, out, results))
+        self.library[function](ctypes.c_long(len(given)), *pointers)
+        return out, results.astype(np.int64)
+
+
+def world_of(position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return X to C: turns about the fixed axes x, y, z, one after the other."""
+    angles = Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
+    return np.concatenate([position, angles], axis=-1)
+
+
+def home_mode(design: Design) -> int:
+    return int(mode_of(margins(design.home_pose.position, design.home_pose.rotation)))
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_files_have_the_limits_of_the_design(name: str) -> None:
+    design = DESIGNS[name]
+    files = {file: data.decode() for file, data in linuxcnc_files(design).items()}
+    assert not [file for file, text in files.items() if "${" in text]
+    ini = configparser.ConfigParser(interpolation=None)
+    ini.read_string(files["flagged44.ini"])
+    unit, limits, home = design.unit_mm, design.limits, design.home_pose
+    world = world_of(unit * np.array(home.position), home.rotation)
+    assert_allclose(list(map(float, ini["TRAJ"]["HOME"].split())), world, rtol=0, atol=1e-6)
+    assert files[ini["HAL"]["HALFILE"]].count("motor-pos-fb") == int(ini["KINS"]["JOINTS"]) == 6
+    for index, at in enumerate(unit * inverse(design, home.position, home.rotation)):
+        joint = ini[f"JOINT_{index}"]
+        assert float(joint["HOME"]) == float(joint["HOME_OFFSET"]) == pytest.approx(at, abs=1e-6)
+    # Ranges are those of the design if it states them, and no valid pose leaves any.
+    guide = limits.guide or (None, None)
+    box = (3 * [None], 3 * [None]) if limits.box is None else limits.box
+    stated = np.array(
+        [
+            *zip(*box, strict=True),
+            *(design.length_range(each) if each in LENGTHS else guide for each in JOINTS),
+        ],
+        dtype=float,
+    )
+    sections = [*(f"AXIS_{axis}" for axis in "XYZ"), *(f"JOINT_{index}" for index in range(6))]
+    keys = ("MIN_LIMIT", "MAX_LIMIT")
+    ranges = np.array([[float(ini[each][key]) for key in keys] for each in sections])
+    is_stated = np.isfinite(stated)
+    assert_allclose(ranges[is_stated], unit * stated[is_stated], rtol=0, atol=1e-6)
+    position, rotation = poses_about_home(design, 5000, 0)
+    values = unit * np.hstack([position, inverse(design, position, rotation)])
+    values = values[poses_are_valid(design, position, rotation)]
+    assert len(values) > 50
+    assert (ranges[:, 0] - 1e-6 <= values).all()
+    assert (values <= ranges[:, 1] + 1e-6).all()
+
+
+def test_no_joint_is_faster_than_its_speed() -> None:
+    design = in_mm(limited_design(3))
+    linear, angular = axis_speeds(design)
+    position, rotation = poses_about_home(design, 2000, 3)
+    spins = np.radians(angular) * np.random.default_rng(3).choice([-1.0, 1.0], (2000, 3))
+    _, b, c = np.radians(world_of(position, rotation)[:, 3:]).T
+    about_a = np.column_stack([np.cos(b) * np.cos(c), np.cos(b) * np.sin(c), -np.sin(b)])
+    about_b = np.column_stack([-np.sin(c), np.cos(c), 0.0 * c])
+    turn = spins[:, :1] * about_a + spins[:, 1:2] * about_b + spins[:, 2:] * [0.0, 0.0, 1.0]
+    twist = np.column_stack([linear * np.sign(spins), turn])
+    rates = jacobian(design, position, rotation) @ twist[:, :, None]
+    assert 1.5 * linear < np.abs(rates).max() <= 3.0 * linear
+
+
+@compiled
+@pytest.mark.parametrize("name", DESIGNS)
+def test_component_equals_python(name: str, tmp_path: Path) -> None:
+    component, kernel = Component(DESIGNS[name], tmp_path), CompiledKernel(DESIGNS[name], tmp_path)
+    design, mode = in_mm(DESIGNS[name]), home_mode(DESIGNS[name])
+    size, poses = size_of(design), poses_about_home(design, 5000, 1)
+    worlds, expected = world_of(*poses), inverse(design, *poses)
+    found, results = component.inverse(worlds)
+    others = sum(1 << LIMIT_NAMES.index(limit) for limit in OF_LINUXCNC)
+    of_mode = mode_of(margins(*poses)) == mode
+    allowed = (kernel.limits(*poses) & ~others == 0) & of_mode
+    assert_array_equal(results, np.where(allowed, 0, -1))
+    assert 0.02 < allowed.mean() < 1.0
+    assert_allclose(found[allowed], expected[allowed], rtol=0, atol=1e-12 * size)
+    assert np.isnan(found[~allowed]).all()
+
+    expected[::5] *= np.random.default_rng(1).uniform(0.5, 1.5, (len(expected[::5]), 6))
+    before = worlds + np.random.default_rng(2).uniform(-800.0, 800.0, worlds.shape)
+    position, rotation, feasible = forward(design, expected)
+    assert 0.0 < feasible.mean() < 1.0
+    found, results = component.forward(expected, before)
+    assert_array_equal(results, np.where(feasible, 0, -1))
+    assert_array_equal(found[~feasible], before[~feasible])
+    found, before = found[feasible], before[feasible]
+    assert_allclose(found[:, :3], position[feasible, mode], rtol=0, atol=1e-12 * size)
+    turned = Rotation.from_euler("xyz", found[:, 3:], degrees=True).as_matrix()
+    assert_allclose(turned, rotation[feasible, mode], rtol=0, atol=1e-12)
+    assert np.abs(found[:, [3, 5]] - before[:, [3, 5]]).max() <= 180.0
+    assert np.abs(found[:, 4]).max() <= 90.0
+
+
+@compiled
+def test_moves_begin_where_joints_were_jogged_and_lead_back(tmp_path: Path) -> None:
+    component, design = Component(OPTIMAL, tmp_path), in_mm(OPTIMAL)
+    home = design.home_pose
+    world = world_of(np.array([home.position]), home.rotation[None])
+    joints = inverse(design, home.position, home.rotation)[None]
+    # d1 passes d3, which breaks the order of the carriages.
+    jogged = joints + [0.0, 12.0, 0.0, 0.0, 0.0, 0.0]
+    there, results = component.forward(jogged, world)
+    assert results == 0
+    assert_allclose(component.inverse(there)[0], jogged, rtol=0, atol=1e-10)
+    assert component.forward(joints, there)[1] == 0
+    assert component.inverse(there)[1] == -1
+    assert component.message == "flagged44kins: the pose breaks limits: order\n"
+    # At a pitch of 90 degrees the roll is zero.
+    steep = np.array([[*home.position, 20.0, -90.0, 150.0]])
+    rotation = Rotation.from_euler("xyz", steep[:, 3:], degrees=True).as_matrix()
+    assert mode_of(margins(steep[:, :3], rotation)) == home_mode(design)
+    found, results = component.forward(inverse(design, steep[:, :3], rotation), world)
+    assert results == 0
+    turned = Rotation.from_euler("xyz", found[:, 3:], degrees=True).as_matrix()
+    assert_allclose(turned, rotation, rtol=0, atol=1e-6)
+
+
+def test_home_that_breaks_limits_is_refused() -> None:
+    with pytest.raises(NoAnswerError, match=r"home pose, which breaks limits: l1 = 117\.4 mm"):
+        linuxcnc_files(OPTIMAL.with_limits(l1=(0.0, 5.0)))
+
+
+@pytest.mark.skipif(shutil.which("halcompile") is None, reason="no LinuxCNC on this machine")
+@pytest.mark.parametrize("name", DESIGNS)
+def test_halcompile_builds_the_component(name: str, tmp_path: Path) -> None:
+    for file, data in linuxcnc_files(DESIGNS[name]).items():
+        (tmp_path / file).write_bytes(data)
+    subprocess.run(["halcompile", "--compile", "flagged44kins.comp"], cwd=tmp_path, check=True)
+    assert (tmp_path / "flagged44kins.so").exists()
