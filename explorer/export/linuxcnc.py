@@ -34,11 +34,11 @@ AXES = "XYZABC"
 # half turn.
 ANGLES = ((-360.0, 360.0), (-90.0, 90.0), (-360.0, 360.0))
 
-# Seconds in which X, Y and Z cross the reach, and in which they gather speed.
-CROSSING, GATHERING = 8.0, 0.1
+# Seconds in which X, Y and Z cross the reach, and in which axes and joints come to their speed.
+CROSS_SECONDS, START_SECONDS = 8.0, 0.1
 
-# A joint moves as fast as X, Y and Z jogged at once, and the farthest turn of the platform.
-JOINT_OVER_AXIS = 3.0
+# No joint is faster than three times X, Y and Z, even if all six axes move at their speeds at once.
+JOINT_SPEED_RATIO = 3.0
 
 
 def linuxcnc_files(design: Design) -> dict[str, bytes]:
@@ -68,9 +68,9 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
         "jog": _number(linear / 2.0),
         "jog_angular": _number(angular / 2.0),
         "feed": _number(30.0 * linear),
-        "joint": _number(JOINT_OVER_AXIS * linear),
-        "linear_acceleration": _number(linear / GATHERING),
-        "angular_acceleration": _number(angular / GATHERING),
+        "joint": _number(JOINT_SPEED_RATIO * linear),
+        "linear_acceleration": _number(linear / START_SECONDS),
+        "angular_acceleration": _number(angular / START_SECONDS),
         "axis_rows": _table(AXES, axes, world),
         "joint_rows": _table(JOINTS, joints, map(_number, home)),
         "axis_sections": "\n".join(
@@ -79,7 +79,7 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
         ),
         "joint_sections": "\n".join(
             f"[JOINT_{index}]\n# {name}\nTYPE = LINEAR\n"
-            f"{_range_lines(row, JOINT_OVER_AXIS * linear)}"
+            f"{_range_lines(row, JOINT_SPEED_RATIO * linear)}"
             f"HOME = {_number(at)}\nHOME_OFFSET = {_number(at)}\nHOME_SEQUENCE = 0\n"
             for index, (name, row, at) in enumerate(zip(JOINTS, joints, home, strict=True))
         ),
@@ -130,7 +130,7 @@ def axis_speeds(design: Design) -> tuple[float, float]:
 
     The three angles together move no point of the platform faster than the linear speed.
     """
-    linear = float(f"{design.unit_mm * design.reach / CROSSING:.2g}")
+    linear = float(f"{design.unit_mm * design.reach / CROSS_SECONDS:.2g}")
     radius = design.unit_mm * float(np.linalg.norm(design.platform_points, axis=1).max())
     return linear, float(f"{math.degrees(linear / (3.0 * radius)):.2g}")
 
@@ -156,13 +156,13 @@ def _range_lines(row: FloatArray, speed: float) -> str:
     low, high = map(_number, row)
     return (
         f"MIN_LIMIT = {low}\nMAX_LIMIT = {high}\n"
-        f"MAX_VELOCITY = {_number(speed)}\nMAX_ACCELERATION = {_number(speed / GATHERING)}\n"
+        f"MAX_VELOCITY = {_number(speed)}\nMAX_ACCELERATION = {_number(speed / START_SECONDS)}\n"
     )
 
 
 def _table(names: Iterable[str], ranges: FloatArray, home: Iterable[str]) -> str:
     """Return rows of a text: the name, the least value, that at home, the greatest."""
     return "\n".join(
-        f"    {name:<2}{_number(low):>14}{at:>14}{_number(high):>14}"
+        f"    {name:<5}{_number(low):>14}{at:>14}{_number(high):>14}"
         for name, (low, high), at in zip(names, ranges, home, strict=True)
     )
