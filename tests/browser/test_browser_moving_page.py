@@ -99,29 +99,29 @@ def test_moving_page_has_the_numbers_of_python(page: Page, tmp_path: Path, seed:
     assert [set(each) for each in broken] == limits_in_python(design, position, rotation)
 
 
-@pytest.mark.parametrize("design", [OPTIMAL, PRESETS["paper-initial"]])
+@pytest.mark.parametrize(
+    "design",
+    [
+        OPTIMAL,
+        PRESETS["paper-initial"],
+        # Dimensions that lose digits: b2 and b3 nearly coincide, a3 is nearly on the guide.
+        msgspec.structs.replace(OPTIMAL, b2=2.6, b3=2.6 + 1e-6, unit_mm=1e-3),
+        msgspec.structs.replace(OPTIMAL, a3=(1e3, 1e-3)),
+    ],
+)
 def test_moving_page_finds_the_modes_of_python(page: Page, tmp_path: Path, design: Design) -> None:
     open_page(page, design, tmp_path)
     design = in_mm(design)
-    size, rng = size_of(design), np.random.default_rng(1)
-    # Folds off the walls, where no cosine is a square root of rounding.
-    folds = rng.uniform(0.5, np.pi - 0.5, (COUNT, 6))
-    folds[:, 0] *= 0.2 * size
-    position, rotation = from_folds(folds)
-    joints = inverse(design, position, rotation)
-    joints[::3] *= rng.uniform(0.5, 1.5, (len(joints[::3]), 6))
+    joints = inverse(design, *random_poses(design, COUNT, 1))
+    joints[::7] *= np.random.default_rng(1).uniform(0.5, 1.5, (len(joints[::7]), 6))
     positions, rotations, feasible = forward(design, joints)
+    assert 0.03 < 1.0 - feasible.mean() < 0.3
     found = call(page, "row => m.forward(row)", joints.tolist())
     assert [each is not None for each in found] == feasible.tolist()
-    closed = [each for each in found if each is not None]
-    flat = np.abs(margins(positions[:, 7], rotations[:, 7])).min(axis=1) < 0.05 * size
-    again = from_folds(closed)
-    near = flat[feasible]
-    assert near.mean() < 0.2
-    error = np.abs(again[0] - positions[feasible, 7]).max(axis=1)
-    assert error[~near].max() <= SHARE * size
-    error = np.abs(again[1] - rotations[feasible, 7]).max(axis=(1, 2))
-    assert error[~near].max() <= SHARE
+    # Both take the same steps, so that flat folds do not double the digits that are lost.
+    position, rotation = from_folds([each for each in found if each is not None])
+    assert_allclose(position, positions[feasible, 7], rtol=0, atol=SHARE * size_of(design))
+    assert_allclose(rotation, rotations[feasible, 7], rtol=0, atol=SHARE)
 
 
 def test_moving_page_moves_by_fields_sliders_modes_and_keys(page: Page, tmp_path: Path) -> None:
@@ -131,9 +131,13 @@ def test_moving_page_moves_by_fields_sliders_modes_and_keys(page: Page, tmp_path
     expect(page.locator("#limits-brief")).to_have_text("kept")
 
     # A value beyond a limit is taken, and the limit told.
-    page.get_by_label("x (mm)").fill("230")
+    page.get_by_label("x (mm)").fill("23,5 cm")
     page.keyboard.press("Enter")
-    expect(page.locator("#broken")).to_contain_text("x of b4 is 230.0 mm, above its maximum of 200")
+    expect(page.locator("#broken")).to_contain_text("x of b4 is 235.0 mm, above its maximum of 200")
+    page.get_by_label("x (mm)").fill("1,234.5")
+    page.keyboard.press("Enter")
+    expect(page.locator("#message")).to_contain_text("“1,234.5” is no length")
+    expect(page.get_by_label("x (mm)")).to_have_value("235")
     page.locator("#home").click()
     expect(page.locator("#broken")).to_have_text("All kept.")
 

@@ -24,6 +24,15 @@ window.startPage = (design) => {
     const text = Math.abs(value).toFixed(places);
     return (value < 0 && Number(text) > 0 ? "−" : "") + text;
   };
+  // A typed number in mm or degrees, with a point or a comma and perhaps a unit; null if it is none.
+  const LENGTHS = { "": 1, mm: 1, cm: 10, m: 1000, in: 25.4 };
+  const ANGLES = { "": 1, "°": 1, deg: 1, rad: 1 / DEGREE };
+  const read = (text, units) => {
+    const plain = text.trim().replace("−", "-").replace(",", ".");
+    const [, number, unit] =
+      /^([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(\S*)$/i.exec(plain) ?? [];
+    return Object.hasOwn(units, unit) ? Number(number) * units[unit] : null;
+  };
   const mix = (a, b, share) => a.map((value, i) => value + share * (b[i] - value));
   const css = (colour) => `rgb(${colour.map(Math.round).join(" ")})`;
   // The explorer's scale of proximity, of a margin over the warning value.
@@ -155,12 +164,18 @@ window.startPage = (design) => {
       Object.assign(range, { type: "range", step: "any" });
       [range.min, range.max] = spanOf(name);
       range.setAttribute("aria-label", name);
-      Object.assign(number, { type: "number", step: 10 ** -decimals, inputMode: "decimal" });
+      // A field for numbers alone would take 12,5 as 125 and 1.5 cm as 1.5.
+      Object.assign(number, { type: "text", autocomplete: "off" });
       range.addEventListener("input", () => change(state.tab, index, range.valueAsNumber));
       number.addEventListener("input", () => (number.dataset.typed = ""));
       number.addEventListener("change", () => {
         delete number.dataset.typed;
-        if (Number.isFinite(number.valueAsNumber)) change(state.tab, index, number.valueAsNumber);
+        const value = read(number.value, HALF[name] ? ANGLES : LENGTHS);
+        if (value !== null) change(state.tab, index, value);
+        else if (number.value)
+          say(
+            `“${number.value}” is no ${HALF[name] ? "angle: type 12.5 or 0.2 rad" : "length: type 12.5, 12,5 or 1.2 cm"}.`,
+          );
         refresh();
       });
       return { name, cells: [row, range, number] };

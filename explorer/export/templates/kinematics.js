@@ -6,6 +6,8 @@ window.flagged44 = (design) => {
   const [b1x, b1y] = design.b1;
   const { b2, b3 } = design;
   const size = Math.max(...[a3x, a3y, b1x, b1y, b2, b3].map(Math.abs));
+  // Relative rounding of one operation, and the error bounds below zero that count as zero.
+  const [EPSILON, ROUNDINGS] = [2 ** -52, 8];
   const pairs = [0, 1, 2].flatMap((i) => [1, 2, 3].filter((j) => j > i).map((j) => [i, j]));
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -85,30 +87,75 @@ window.flagged44 = (design) => {
   };
 
   // The folds of joints, with φ1, φ2 and φ3 from 0 to π: their signs are those of the mode. Null
-  // if the joints do not close. The three discriminants are the squared margins.
-  const forward = ([l1, d1, d2, d3, d4, l4]) => {
+  // if the joints do not close. Each operation is Python's, so that flat folds are the same too.
+  const forward = (joints) => {
+    const [l1, d1, d2, d3, d4, l4] = joints;
+    const { abs, sqrt, max } = Math;
+    const clamp = (value) => max(-1, Math.min(1, value));
+    const sineOf = (cosine) => sqrt((1 - cosine) * (1 + cosine));
+    // c is the cosine between the guide and the line b2b3, h the distance of b4 from the guide. The
+    // squared margins are g² − v², (1 − c²) h² − lean² and h² − py², with the parts u and v of
+    // the vector from a1 to b4 on the platform's axes. Bounds of rounding begin with e.
     const span = b3 - b2;
-    const c = (d3 - d1) / span;
+    const ends = abs(b3) + abs(b2);
+    const stretch = 1 + ends / abs(span);
+    let c = (d3 - d1) / span;
+    const ec = (EPSILON * (abs(d3) + abs(d1) + abs(c) * ends)) / abs(span);
     const sine2 = (1 - c) * (1 + c);
+    const eSine = 2 * abs(c) * ec + EPSILON * abs(sine2);
     const px = d1 - b2 * c;
+    const epx = abs(b2) * ec + EPSILON * (abs(d1) + abs(b2 * c));
     const t = -b2 / span;
-    const h2 = (1 - t) * d2 * d2 + t * d4 * d4 - t * (1 - t) * span * span * sine2;
+    const pull = t * (1 - t) * span * span;
+    const h2 = (1 - t) * d2 * d2 + t * d4 * d4 - pull * sine2;
+    const h2Terms = abs(1 - t) * d2 * d2 + abs(t) * d4 * d4 + abs(pull * sine2);
+    const eh = abs(pull) * eSine + EPSILON * h2Terms * stretch;
     const lean = (d4 * d4 - d2 * d2 - (b3 + b2) * span * sine2) / (2 * span);
-    const r2 = px * px + h2;
+    const leanTerms = (d4 * d4 + d2 * d2) / (2 * abs(span)) + abs(lean) * stretch;
+    const eLean = 0.5 * abs(b3 + b2) * eSine + EPSILON * leanTerms;
     const u = c * px + lean;
-    const py = ((px - a3x) * (px - a3x) + h2 + a3y * a3y - l4 * l4) / (2 * a3y);
-    const v = (l1 * l1 - r2 - b1x * b1x - b1y * b1y - 2 * b1x * u) / (2 * b1y);
+    const eu = abs(px) * ec + abs(c) * epx + eLean;
+    const r2 = px * px + h2;
+    const er = 2 * abs(px) * epx + eh + EPSILON * px * px;
+    const side = px - a3x;
+    const py = (side * side + h2 + a3y * a3y - l4 * l4) / (2 * a3y);
+    const pyTerms = side * side + abs(h2) + a3y * a3y + l4 * l4;
+    const epy = (2 * abs(side) * epx + eh + EPSILON * pyTerms) / (2 * abs(a3y));
+    const b1Square = b1x * b1x + b1y * b1y;
+    const v = (l1 * l1 - r2 - b1Square - 2 * b1x * u) / (2 * b1y);
+    const vTerms = l1 * l1 + abs(r2) + b1Square;
+    const ev = (er + 2 * abs(b1x) * eu + EPSILON * vTerms) / (2 * abs(b1y));
+    const errorOf = (value, error) => (2 * abs(value) + error) * error;
     const squares = [r2 - u * u - v * v, sine2 * h2 - lean * lean, h2 - py * py];
-    const rounding = 1e-13 * (size * size + d2 * d2 + d4 * d4 + l1 * l1 + l4 * l4 + px * px);
-    const least = Math.min(...squares, h2, size * size * sine2);
-    if (!(least >= -rounding && Math.min(l1, d2, d4, l4) >= 0)) return null;
-    const [delta1, delta2, delta3, h, g] = [...squares, h2, r2 - u * u].map((square) =>
-      Math.sqrt(Math.max(0, square)),
-    );
-    const r = Math.sqrt(px * px + h * h);
-    const phi2 = Math.atan2(r * delta2, lean * px - c * h * h);
-    const [phi1, phi3] = [Math.atan2(delta1, -v), Math.atan2(delta3, py)];
-    return [r, Math.atan2(h, px), Math.atan2(g, u), phi1, phi2, phi3];
+    const errors = [er + errorOf(u, eu) + errorOf(v, ev), 0, eh + errorOf(py, epy)];
+    errors[1] = abs(sine2) * eh + abs(h2) * eSine + errorOf(lean, eLean);
+    if (sine2 < 0 || h2 < 0) {
+      // Their product may be positive. The sine is made a length by the largest one.
+      const largest = max(size, ...joints.map(abs));
+      squares[1] = Math.min(squares[1], largest * largest * sine2, h2);
+      errors[1] += largest * largest * eSine + eh;
+    }
+    const closes = squares.every((value, i) => value >= -ROUNDINGS * errors[i]);
+    if (!closes || Math.min(l1, d2, d4, l4) < 0) return null;
+    // Where a cosine is beyond 1 the fold is flat.
+    c = clamp(c);
+    const h = sqrt(max(0, h2));
+    const r = sqrt(px * px + h * h);
+    const [cb, sb] = r > 0 ? [px / r, h / r] : [1, 0];
+    let ce = r > 0 ? clamp(u / r) : c;
+    let se = sineOf(ce);
+    let c2 = sb * se > 0 ? (cb * ce - c) / (sb * se) : 1;
+    if (abs(c2) >= 1) {
+      // The lines are in one plane, so ε follows from β and the angle between them.
+      c2 = Math.sign(c2);
+      const sine = sb * ce + c2 * cb * se < 0 ? -sineOf(c) : sineOf(c);
+      ce = cb * c + sb * sine;
+      se = c2 * (cb * sine - sb * c);
+    }
+    const c1 = r * se > 0 ? clamp(-v / (r * se)) : 1;
+    const c3 = h > 0 ? clamp(py / h) : 1;
+    const folds = [c1, c2, c3].map((cosine) => Math.atan2(sineOf(cosine), cosine));
+    return [r, Math.atan2(sb, cb), Math.atan2(se, ce), ...folds];
   };
 
   // Bit 2 is set if δ1 is positive, bit 1 if δ2 is, bit 0 if δ3 is.
