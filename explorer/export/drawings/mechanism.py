@@ -54,7 +54,7 @@ _FROM = np.array([0.72, -1.0, 0.62])
 _LETTER, _HEIGHT = 6.4, 12.0
 _DIRECTIONS = np.radians((45, 135, -45, -135, 90, -90, 0, 180))
 _PLACES = np.array([*itertools.product((13.0, 19.0, 26.0), _DIRECTIONS)])
-_ALONG = np.linspace(0.0, 1.0, 25)[:, None]
+_ALONG = np.linspace(0.0, 1.0, 97)[:, None]
 
 
 def _axes(name: ViewName) -> FloatArray:
@@ -167,7 +167,7 @@ def labels(
         overlap = np.maximum(common, 0.0).prod(axis=-1).sum(axis=-1)
         inside = ((covered > lows) & (covered < highs)).all(axis=-1).sum(axis=-1)
         beyond = np.concatenate([within[:2] - low, high - within[2:], np.zeros_like(low)], axis=1)
-        cost = overlap + 4.0 * inside + 50.0 * beyond.max(axis=1) + 1.2 * distance
+        cost = overlap + inside + 50.0 * beyond.max(axis=1) + 1.2 * distance
         best = int(cost.argmin())
         taken.append(np.concatenate([low[best], high[best]]))
         x, y = float(middle[best, 0]), float(high[best, 1]) - 2.5
