@@ -23,6 +23,7 @@ from explorer.workspace.limits import quantities
 from explorer.workspace.limits.table import demands_of
 from explorer.workspace.limits.valid_poses import Rules
 
+ASCII = str.maketrans("\u2212", "-", "°")
 KERNEL_FILES = ("flagged44.h", "flagged44.c")
 
 LIMIT_NAMES = (
@@ -57,7 +58,8 @@ def kernel_files(design: Design) -> dict[str, bytes]:
         "axes": _table(axes),
         "radii": _numbers(radii),
         "bits": "\n".join(
-            f"    F44_{name} = 1u << {bit}, /* {text or 'no limit'} */"
+            # Compilers of some code pages warn of other letters than those of ASCII.
+            f"    F44_{name} = 1u << {bit}, /* {text.translate(ASCII) or 'no limit'} */"
             for bit, (name, text) in enumerate(zip(LIMIT_NAMES, words + pair_words, strict=True))
         ),
     }

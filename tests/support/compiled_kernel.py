@@ -16,7 +16,8 @@ from explorer.export.controller import kernel_files
 from explorer.numerics.arrays import FloatArray, IntArray
 
 COMPILER = shutil.which("cc")
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-pedantic")
+STRICT = ("-std=c99", *WARNINGS)
 SANITIZED = ("-O2", "-fsanitize=undefined")
 ROWS = Path(__file__).parent / "kernel_rows.c"
 
