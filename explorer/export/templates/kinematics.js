@@ -162,8 +162,8 @@ window.flagged44 = (design) => {
   const modeOf = (signs) => signs.reduce((mode, sign) => 2 * mode + (sign > 0 ? 1 : 0), 0);
   const signsOf = (mode) => [4, 2, 1].map((bit) => (mode & bit ? 1 : -1));
 
-  // The distance of the axes of two legs.
-  const distance = (first, second) => {
+  // The squared distance of the axes of two legs.
+  const squareBetween = (first, second) => {
     const [u, v] = [first, second].map(({ foot, tip }) => minus(tip, foot));
     const w = minus(first.foot, second.foot);
     const share = (value, over) => (value <= 0 || over <= 0 ? 0 : Math.min(1, value / over));
@@ -176,8 +176,10 @@ window.flagged44 = (design) => {
     ];
     const n = cross(u, v);
     const [nn, s, t] = [dot(n, n), dot(n, cross(v, w)), dot(n, cross(u, w))];
-    if (s > 0 && s < nn && t > 0 && t < nn) ends.push([s / nn, share((uv * s) / nn + vr, vv)]);
-    return Math.min(...ends.map(([p, q]) => length(along(along(w, p, u), -q, v))));
+    if (s > 0 && s < nn && t > 0 && t < nn) ends.push([s / nn, share(uv * (s / nn) + vr, vv)]);
+    return Math.min(
+      ...ends.map(([p, q]) => along(along(w, p, u), -q, v)).map((gap) => dot(gap, gap)),
+    );
   };
 
   // The quantities that limits bound, in the order of `design.limits`: b4, the margins, d1, d3,
@@ -204,9 +206,10 @@ window.flagged44 = (design) => {
       if (!(least <= value && value <= most)) limits.push({ index, value, above: value > most });
     });
     const ends = legs(pose);
-    const collisions = pairs.filter(
-      ([i, j], k) => design.radii[k] >= 0 && !(distance(ends[i], ends[j]) > design.radii[k]),
-    );
+    const collisions = pairs.filter(([i, j], k) => {
+      const radius = design.radii[k];
+      return radius >= 0 && !(squareBetween(ends[i], ends[j]) > radius * radius);
+    });
     return { limits, collisions };
   };
 
