@@ -60,7 +60,9 @@ _UNITS: dict[str, Mapping[str, float]] = {
     **{name: {} for name in QUATERNION},
     "time": {"s": 1.0},
 }
-_HEADING = re.compile(r"(\w+?)\s*(?:[\[(]\s*([-+.\de]*)\s*([a-z°]+)\s*[\])]|_(mm|cm|m|deg|rad|s))?")
+_HEADING = re.compile(
+    r"(\w+?)\s*(?:[\[(]\s*([-+.\de]*)\s*([a-z°]+)\s*[\])]|_(mm|cm|m|in|deg|rad|s))?"
+)
 
 
 class Column(NamedTuple):
@@ -80,12 +82,14 @@ class Table:
 
     Attributes:
         file: Name of the file, for messages.
+        headings: Headings of all columns, known or not.
         columns: Known columns by their names, without units.
         rows: Number of the line in the file, and cells, of each line that is not blank.
         decimal: The decimal sign of numbers, a point or a comma.
     """
 
     file: str
+    headings: Sequence[str]
     columns: Mapping[str, Column]
     rows: Sequence[tuple[int, list[str]]]
     decimal: str
@@ -105,8 +109,9 @@ class Table:
         missing = [name for name in names if name not in self.columns]
         if missing:
             raise InputError(
-                f"{self.file} has no column {missing[0]}; it needs {', '.join(names)}, each with "
-                f"its unit if it has one, such as {names[0]}{_example(names[0])}"
+                f"{self.file} has no column {missing[0]} among {', '.join(self.headings)}; it "
+                f"needs {', '.join(names)}, each with its unit if it has one, such as "
+                f"{names[0]}{_example(names[0])}"
             )
         columns = [self.columns[name] for name in names]
         values = np.empty((len(self.rows), len(names)))
@@ -159,8 +164,8 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
             f"{file} needs a line of headings, such as x_mm, and 1 to {MOST_LINES} lines of "
             f"numbers below it; it has {len(rows)} lines that are not blank"
         )
-    columns: dict[str, Column] = {}
-    for place, heading in enumerate(cell.strip() for cell in rows[0][1]):
+    headings, columns = [cell.strip() for cell in rows[0][1]], dict[str, Column]()
+    for place, heading in enumerate(headings):
         match = _HEADING.fullmatch(heading.lower())
         if match is None or match[1] not in _UNITS:
             continue
@@ -178,7 +183,7 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
                 )
             )
         columns[match[1]] = Column(place, heading, factor)
-    width = len(rows[0][1])
+    width = len(headings)
     for line, cells in rows[1:]:
         if any(map(str.strip, cells[width:])):
             raise InputError(
@@ -186,7 +191,7 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
                 "decimal points, or semicolons separate the columns"
             )
         cells.extend([""] * (width - len(cells)))
-    return Table(file, columns, rows[1:], "," if separator == ";" else ".")
+    return Table(file, headings, columns, rows[1:], "," if separator == ";" else ".")
 
 
 def _factor(match: re.Match[str], unit_mm: float) -> float | None:

@@ -103,12 +103,12 @@ def _write_answer(
     table, out = files
     write_whole(out, answer.csv.encode())
     line, fault = answer.first or (None, None)
-    lines = [f"{answer.lines} lines of {table}, written to {out}"]
+    lines = [f"lines of {table}, written to {out}: {answer.lines}"]
     if answer.closing < answer.lines:
-        lines.append(f"{answer.closing} of them close")
-    lines.append(f"{answer.within} of them are within the limits")
+        lines.append(f"lines that close: {answer.closing}")
+    lines.append(f"lines within the limits: {answer.within}")
     if line is not None:
-        lines.append(f"the first that is not is line {line}: {fault}")
+        lines.append(f"first of the others, line {line}: {fault}")
     command.write(
         lambda: {
             "file": out,
