@@ -149,7 +149,7 @@ def test_example_of_the_header_compiles_and_runs(name: str, tmp_path: Path) -> N
     for file, data in kernel_files(design).items():
         (tmp_path / file).write_bytes(data)
     header = (tmp_path / "flagged44.h").read_text("utf-8")
-    assert header.isascii() == name.isascii()
+    assert header.isascii() == (name == "arm")
     lines = re.findall(r"^ \*     (.*)$", header, re.MULTILINE)
     example = "\n".join(lines[lines.index('#include "flagged44.h"') :])
     (tmp_path / "main.c").write_text(example, "utf-8")
