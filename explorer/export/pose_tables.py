@@ -173,15 +173,9 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
             raise InputError(f"{file} has two columns {match[1]}: leave one out")
         factor = _factor(match, unit_mm)
         if factor is None:
-            units = ", ".join(_UNITS[match[1]])
-            raise InputError(
-                f"{file}, column {heading}: its unit must be "
-                + (
-                    f"one of {units}, such as {match[1]}{_example(match[1])}"
-                    if units
-                    else "left out"
-                )
-            )
+            units, example = ", ".join(_UNITS[match[1]]), f"{match[1]}{_example(match[1])}"
+            needs = f"one of {units}, such as {example}" if units else "left out"
+            raise InputError(f"{file}, column {heading}: its unit must be {needs}")
         columns[match[1]] = Column(place, heading, factor)
     width = len(headings)
     for line, cells in rows[1:]:
