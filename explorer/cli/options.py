@@ -253,6 +253,12 @@ class OrientationOptions:
     """Orientation of the platform in T&T angles: azimuth and angle of its tilt, and its torsion, in
     degrees."""
 
+    @property
+    def has_orientation(self) -> bool:
+        """Whether one of the options is given."""
+        given = self.quaternion, self.yaw_pitch_roll, self.tilt_torsion
+        return any(each is not None for each in given)
+
     def oriented_home(self, design: Design) -> Pose:
         """Return the home pose of the design with the given orientation, as `make_pose` does."""
         return make_pose(self, "", design.home_pose)

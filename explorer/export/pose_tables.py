@@ -95,6 +95,11 @@ class Table:
     decimal: str
 
     @property
+    def has_orientations(self) -> bool:
+        """Whether a column states orientations."""
+        return any(not self.columns.keys().isdisjoint(names) for names in _ROTATIONS)
+
+    @property
     def lines(self) -> list[int]:
         """The number of the line in the file of each row."""
         return [line for line, _ in self.rows]

@@ -185,6 +185,8 @@ def test_faults_are_told_with_line_and_column(case: str) -> None:
 def test_options_of_tables_are_refused_without_one(cli: CommandLine, tmp_path: Path) -> None:
     table, out = tmp_path / "joints.csv", tmp_path / "out.csv"
     table.write_text("l1,d1,d2,d3,d4,l4\n1,2,-3,4,5,6\n", encoding="utf-8")
+    turns = tmp_path / "turns.csv"
+    turns.write_text("x,y,z,yaw,pitch,roll\n1,2,3,4,5,6\n", encoding="utf-8")
     joints = ("--joints", *"123456")
     for argv, words in (
         (("inverse", "--out", out), "give both"),
@@ -192,6 +194,8 @@ def test_options_of_tables_are_refused_without_one(cli: CommandLine, tmp_path: P
         (("inverse", "--poses", table, "--out", out, "--position", *"123"), "leave --position"),
         (("inverse", "--poses", tmp_path / "none.csv", "--out", out), "cannot read"),
         (("inverse", "--poses", table, "--out", "/nowhere/out.csv"), "there is no folder"),
+        (("inverse", "--poses", table, "--out", table), "name another file"),
+        (("inverse", "--poses", turns, "--out", out, "--quaternion", *"1000"), "has orientations"),
         (("forward", "--joints-file", table, "--out", out, *joints), "either --joints or"),
         (("forward", "--joints-file", table, "--out", out), "column d2: '-3': a length must not"),
     ):

@@ -54,6 +54,11 @@ class Inverse(options.JsonOptions, options.PoseOptions):
             if self.position is not None or self.folds is not None:
                 raise InputError("--poses has the positions; leave --position and --folds out")
             table = _read_table(files[0], design)
+            if self.has_orientation and table.has_orientations:
+                raise InputError(
+                    f"{table.file} has orientations: leave its columns or the options of the "
+                    "orientation out"
+                )
             rotation = self.oriented_home(design).rotation
             poses = pose_tables.read_poses(table, design, rotation, self.at)
             answer = pose_tables.inverse_answer(table, poses, self.at)
@@ -87,6 +92,8 @@ def _files(option: str, table: Path | None, out: Path | None) -> tuple[Path, Pat
         return None
     if table is None or out is None:
         raise InputError(f"{option} FILE.csv is read and --out FILE.csv is written: give both")
+    if table.exists() and out.exists() and out.samefile(table):
+        raise InputError(f"--out {out} is the table to read; name another file")
     check_writable(out)
     return table, out
 
