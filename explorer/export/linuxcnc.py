@@ -45,7 +45,7 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
     """Return the files of the configuration of a design, with its kernel, by their names.
 
     Raises:
-        NoAnswerError: The home pose, in which LinuxCNC begins, breaks limits.
+        NoAnswerError: The home pose, in which LinuxCNC begins, breaks limits or is singular.
     """
     _check_home(design)
     pose, unit = design.home_pose, design.unit_mm
@@ -137,6 +137,11 @@ def axis_speeds(design: Design) -> tuple[float, float]:
 
 def _check_home(design: Design) -> None:
     pose = design.home_pose
+    if np.abs(margins(pose.position, pose.rotation)).min() <= design.tolerance:
+        raise NoAnswerError(
+            "LinuxCNC begins in the home pose, which is singular, so that no assembly mode is its "
+            "own; choose another home pose"
+        )
     if poses_are_valid(design, pose.position, pose.rotation):
         return
     at = Configuration(design, pose.position, pose.rotation)

@@ -17,7 +17,7 @@ from exported_designs import in_mm, limited_design, poses_about_home, size_of
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, forward, inverse, jacobian
+from explorer import PRESETS, Design, Pose, forward, inverse, jacobian
 from explorer.errors import NoAnswerError
 from explorer.export.controller import LIMIT_NAMES
 from explorer.export.linuxcnc import axis_speeds, linuxcnc_files
@@ -191,6 +191,13 @@ def test_moves_begin_where_joints_were_jogged_and_lead_back(tmp_path: Path) -> N
 def test_home_that_breaks_limits_is_refused() -> None:
     with pytest.raises(NoAnswerError, match=r"home pose, which breaks limits: l1 = 117\.4 mm"):
         linuxcnc_files(OPTIMAL.with_limits(l1=(0.0, 5.0)))
+
+
+def test_singular_home_is_refused() -> None:
+    home = OPTIMAL.home_pose
+    flat = Pose((*home.position[:2], 0.0), home.quaternion)
+    with pytest.raises(NoAnswerError, match="which is singular"):
+        linuxcnc_files(msgspec.structs.replace(OPTIMAL, home=flat))
 
 
 @pytest.mark.skipif(shutil.which("halcompile") is None, reason="no LinuxCNC on this machine")
