@@ -56,6 +56,7 @@ from explorer.app.state.view import (
     View,
     WorkspaceView,
 )
+from explorer.export.moving_page import moving_page
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.mechanism.folds import pose_of_folds
@@ -394,9 +395,20 @@ def draw_motion(browser: Browser) -> bytes:
     return data.getvalue()
 
 
+def draw_moving_page(browser: Browser) -> bytes:
+    """Return a picture of the page that moves by itself."""
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.set_content(moving_page(DESIGN).decode())
+    page.wait_for_timeout(1000)
+    data = page.screenshot()
+    page.close()
+    return data
+
+
 PICTURES: dict[str, Callable[[Browser], bytes]] = {
     **{name: partial(draw, scene=scene) for name, scene in SCENES.items()},
     "report": draw_report,
+    "moving-page": draw_moving_page,
     "studies": draw_studies,
     "fold.webp": draw_motion,
 }
