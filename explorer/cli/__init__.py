@@ -33,7 +33,7 @@ COMMANDS: Mapping[str, str] = {
     "reproduce": "Measure the claims of the paper again, and judge each.",
     "optimise": "Optimise a design by SQP: match a volume, shorten the longest leg, or others.",
     "sweep": "Measure the designs of a study, on every core or a cluster; list the Pareto front.",
-    "export": "Write the workspace, the parts, a simulation, the scene or a figure as a file.",
+    "export": "Write workspace, parts, models, pages, a figure or code for controllers as files.",
     "report": "Write a report of a design: drawings, slices, tables, and how to reproduce it.",
     "screenshot": "Draw a pose into a PNG file.",
 }

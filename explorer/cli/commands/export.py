@@ -44,7 +44,7 @@ OF_ALL = ("what", "out", "format", "design", "json")
 
 @dataclass(frozen=True, kw_only=True)
 class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
-    """Write the workspace, the mechanism, its models, pages, a figure or software as files.
+    """Write workspace, parts, models, pages, a figure or code for controllers as files.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
