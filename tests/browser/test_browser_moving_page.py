@@ -198,3 +198,21 @@ def test_moving_page_draws_and_turns_and_fits_a_telephone(page: Page, tmp_path: 
     page.mouse.wheel(0, 200)
     pictures.append(canvas.screenshot())
     assert len(set(pictures)) == len(pictures)
+    # A picture that is not kept is black on paper.
+    assert len(canvas.evaluate("canvas => canvas.toDataURL()")) > 10_000
+    # On paper nothing is behind a scroll bar.
+    page.set_viewport_size({"width": 1440, "height": 600})
+    page.emulate_media(media="print")
+    foot, body = (page.locator(each).bounding_box() for each in ("#origin", "body"))
+    assert foot
+    assert body
+    assert foot["y"] + foot["height"] <= body["height"]
+
+
+def test_moving_page_without_webgl_says_so_and_has_its_numbers(page: Page, tmp_path: Path) -> None:
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    open_page(page, OPTIMAL, tmp_path)
+    page.get_by_label("z (mm)").fill("120")
+    page.keyboard.press("Enter")
+    expect(page.locator("#margin-brief")).to_have_text("δ2 = −114.8 mm")
+    expect(page.locator("#scale")).to_contain_text("no WebGL 2")

@@ -566,13 +566,13 @@ window.startPage = (design) => {
     if (event.key === "f" || event.key === "F") fit();
   });
   find("all").open = window.innerWidth >= 1100;
-  find("scale").textContent = `1 square = ${square} mm`;
+  find("scale").textContent = scene.isReady
+    ? `1 square = ${square} mm`
+    : "This browser has no WebGL 2, so the scene shows labels alone; the numbers hold.";
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => request());
   say();
   buildSliders();
   take(design.home);
-  if (!scene.isReady)
-    say("This browser has no WebGL 2, so the scene stays empty; the numbers hold.");
   let framed = false;
   new ResizeObserver(() => {
     if (!framed) fit();

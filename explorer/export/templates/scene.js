@@ -1,7 +1,9 @@
 // The scene: meshes that WebGL draws, with a camera that pointers and keys turn, and labels above.
 // `changed` is called when the camera has moved; draw again then.
 window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed) => {
-  const gl = canvas.getContext("webgl2", { alpha: false, antialias: true, stencil: true });
+  // What is drawn is kept, or it would be black on paper.
+  const settings = { alpha: false, antialias: true, stencil: true, preserveDrawingBuffer: true };
+  const gl = canvas.getContext("webgl2", settings);
   const HALF_VIEW = Math.tan((16 * Math.PI) / 180);
   const STRIDE = 10;
 
@@ -381,6 +383,7 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
   const draw = ({ ground, cell, background, ink }) => {
     if (!gl || gl.isContextLost()) return;
     const [width, height] = sizeOf();
+    canvas.style.setProperty("--aspect", width / height);
     const density = Math.min(2, window.devicePixelRatio || 1);
     [canvas.width, canvas.height] = [Math.round(density * width), Math.round(density * height)];
     gl.viewport(0, 0, canvas.width, canvas.height);
@@ -438,6 +441,7 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
   const label = (texts) => {
     while (labels.childElementCount < texts.length) labels.append(document.createElement("span"));
     const taken = [];
+    const [across, down] = sizeOf();
     [...labels.children].forEach((span, index) => {
       const at = texts[index] && project(texts[index].at);
       span.hidden = !at;
@@ -453,7 +457,9 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
         Math.abs(each.y - y) < 14 && x < each.x + each.width && each.x < x + width;
       for (let tries = 0; tries < 6 && taken.some(hides); tries += 1) y -= 7;
       taken.push({ x, y, width });
-      span.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+      // Shares of the picture, which may have another size on paper.
+      span.style.left = `${((100 * x) / across).toFixed(2)}%`;
+      span.style.top = `${((100 * y) / down).toFixed(2)}%`;
     });
   };
 
