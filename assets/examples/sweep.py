@@ -1,4 +1,4 @@
-"""Sweep one design variable: the exact workspace volume and the smallest margin at home."""
+"""Sweep one design variable: the exact workspace volume and the conditioning at home."""
 
 import csv
 
@@ -8,13 +8,13 @@ import explorer
 
 start = explorer.PRESETS["paper-optimal"]
 rows: list[tuple[float, float, float]] = []
-for b3 in np.linspace(3.5, 6.5, 7).tolist():
-    design = start.with_variable("b3", b3)
+for b1y in np.linspace(-6.0, -3.0, 7).tolist():
+    design = start.with_variable("b1y", b1y)
     volume = explorer.workspace_volume(design).volume
-    home = design.home_pose
-    margin = abs(explorer.margins(home.position, home.rotation)).min()
-    rows.append((b3, volume, float(margin)))
-    print(f"b3 = {b3:.2f}: volume {volume:.1f}, smallest margin {margin:.3f}")
+    home = explorer.Configuration.at(design, design.home_pose)
+    conditioning = float(home.inverse_condition)
+    rows.append((b1y, volume, conditioning))
+    print(f"b1y = {b1y:.2f}: volume {volume:.1f}, inverse condition number {conditioning:.4f}")
 
 with open("sweep.csv", "w", encoding="utf-8", newline="") as file:
-    csv.writer(file).writerows([("b3", "volume", "margin"), *rows])
+    csv.writer(file).writerows([("b1y", "volume", "inverse_condition"), *rows])
