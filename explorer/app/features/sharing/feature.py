@@ -30,6 +30,7 @@ from explorer.export.linuxcnc import linuxcnc_files
 from explorer.export.moving_page import moving_page
 from explorer.files.extras import is_missing
 from explorer.files.writing import zip_bytes
+from explorer.mechanism.design import Design
 
 PRESS = "export"
 PICTURES: dict[str, tuple[int, int] | float] = {
@@ -117,27 +118,17 @@ def send_report(services: Services, file_format: ReportFormat, who: Who) -> None
     )
 
 
-def send_page(services: Services, who: Who) -> None:
-    """Send the page in which the mechanism of the design moves."""
-    design = services.session.latest_state().design
-    services.downloads.send(who, f"{design.name}-moving.html", moving_page(design))
+def sender_of(
+    ending: str, write: Callable[[Design], bytes]
+) -> Callable[[Services, str, Who], None]:
+    """Return the function that sends what `write` makes of the design, as NAME and an ending."""
 
+    def send(services: Services, _: str, who: Who) -> None:
+        design = services.session.latest_state().design
+        name = f"{design.name}{ending}"
+        services.downloads.make(who, "Writing the file", lambda _: (name, write(design)))
 
-def send_kernel(services: Services, who: Who) -> None:
-    """Send header and source of the kernel of the design as a ZIP archive."""
-    design = services.session.latest_state().design
-    data = zip_bytes(kernel_files(design))
-    services.downloads.send(who, f"{design.name}-kernel.zip", data)
-
-
-def send_linuxcnc(services: Services, who: Who) -> None:
-    """Send the configuration of the design for LinuxCNC as a ZIP archive."""
-    design = services.session.latest_state().design
-
-    def make(_: viser.ClientHandle) -> File:
-        return f"{design.name}-linuxcnc.zip", zip_bytes(linuxcnc_files(design))
-
-    services.downloads.make(who, "Writing the configuration", make)
+    return send
 
 
 class ExportDialog:
@@ -255,19 +246,19 @@ SHARING = Feature(
             "Moving page",
             "A small file with sliders in which the mechanism moves, for lessons and papers.",
             ("HTML",),
-            lambda services, _, who: send_page(services, who),
+            sender_of("-moving.html", moving_page),
         ),
         Export(
             "Kernel for controllers",
             "Kinematics and limits of the design as C99 source, in millimetres.",
             ("C (zip)",),
-            lambda services, _, who: send_kernel(services, who),
+            sender_of("-kernel.zip", lambda design: zip_bytes(kernel_files(design))),
         ),
         Export(
             "Configuration for LinuxCNC",
             "Kinematics, limits and home of the design, to run in simulation at first.",
             ("INI (zip)",),
-            lambda services, _, who: send_linuxcnc(services, who),
+            sender_of("-linuxcnc.zip", lambda design: zip_bytes(linuxcnc_files(design))),
         ),
     ),
 )
