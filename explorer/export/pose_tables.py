@@ -39,7 +39,7 @@ MOST_BYTES = 100_000_000
 """Largest size of a table."""
 MOST_LINES = 100_000
 """Largest number of poses or joints in a table."""
-TOO_LONG = "the lengths do not close"
+NO_POSE = "the lengths do not close"
 """What is wrong with joints that have no pose."""
 
 POSITION, TOOL = ("x", "y", "z"), ("tool_x", "tool_y", "tool_z")
@@ -53,7 +53,8 @@ _ROTATIONS: dict[tuple[str, ...], Callable[[ArrayLike], FloatArray]] = {
 
 # The factor of each unit: to millimetres, degrees and seconds.
 _LENGTH = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-_ANGLE = {"deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)}
+_RADIAN = math.degrees(1.0)
+_ANGLE = {"deg": 1.0, "°": 1.0, "degrees": 1.0, "rad": _RADIAN, "radians": _RADIAN}
 _UNITS: dict[str, Mapping[str, float]] = {
     **dict.fromkeys((*JOINTS, *POSITION, *TOOL), _LENGTH),
     **dict.fromkeys((*YAW_PITCH_ROLL, *TILT_TORSION), _ANGLE),
@@ -61,7 +62,8 @@ _UNITS: dict[str, Mapping[str, float]] = {
     "time": {"s": 1.0},
 }
 _HEADING = re.compile(
-    r"(\w+?)\s*(?:[\[(]\s*([-+.\de]*)\s*([a-z°]+)\s*[\])]|_(mm|cm|m|in|deg|rad|s))?"
+    r"(\w+?)\s*(?:[\[(]\s*([-+.\de]*)\s*([a-z°]+)\s*[\])]"
+    r"|[_\s]+(mm|cm|m|in|deg|degrees|rad|radians|s))?"
 )
 
 
@@ -310,11 +312,11 @@ def _answer(
             values = ",".join([str(number), *map(repr, row), "false" if words[which] else "true"])
             rows.append(f"{starts[index]},{values},{words[which]}")
         else:
-            rows.append(f"{starts[index]},{',' * len(row)},false,{TOO_LONG}")
+            rows.append(f"{starts[index]},{',' * len(row)},false,{NO_POSE}")
     within = np.zeros(len(closes), dtype=np.bool_)
     within[given[closes[given] & (broken == 0)]] = True
     outside: list[int] = np.flatnonzero(~within).tolist()
-    first = (table.lines[outside[0]], TOO_LONG) if outside else None
+    first = (table.lines[outside[0]], NO_POSE) if outside else None
     if outside and closes[outside[0]]:
         # Of eight modes the one that violates the fewest limits.
         there = np.flatnonzero(given == outside[0])

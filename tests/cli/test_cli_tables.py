@@ -24,7 +24,7 @@ from explorer.workspace.limits.valid_poses import violations
 
 PRESET = explorer.PRESETS["paper-optimal"]
 HOME = PRESET.home_pose
-ANGLES = ("yaw_deg", "pitch_deg", "roll [rad]")
+ANGLES = ("yaw_degrees", "pitch deg", "roll_radians")
 
 
 def random_poses(count: int) -> tuple[FloatArray, FloatArray]:
@@ -160,12 +160,12 @@ x,y,z/1,nan,3 | column y: 'nan': this must be a finite number
 x,y,z/1,2,1e300 | column z: '1e300': this must not exceed 1e+12
 x,y,z/1,5,2,3 | line 2 has 4 cells below 3 headings
 x,y,z/1,2 | line 2, column z: ''
-x_in,y mm/1,2 | has no column y among x_in, y mm; it needs x, y, z, each with its unit
+x_in,y-mm/1,2 | has no column y among x_in, y-mm; it needs x, y, z, each with its unit
 x,y,z,x_mm/1,2,3,4 | two columns x: leave one out
 x,y,z,yaw,qw/1,2,3,4,5 | the orientation twice
 x,y,z,yaw/1,2,3,4 | has no column pitch among x, y, z, yaw; it needs yaw, pitch, roll, each
 x [deg],y,z/1,2,3 | column x [deg]: its unit must be one of mm, cm, m, in, such as x_mm
-x,y,z,yaw_mm,pitch,roll/1,2,3,4,5,6 | its unit must be one of deg, °, rad
+x,y,z,yaw_mm,pitch,roll/1,2,3,4,5,6 | its unit must be one of deg, °, degrees, rad, radians
 x,y,z,qw,qx,qy,qz/1,2,3,0,0,0,0 | line 2, column qw: '0': a quaternion must not be all zeros
 x,y,z | 1 to 100000 lines of numbers
 x,y,z/"1,2,3 | line 2, column x
