@@ -33,9 +33,9 @@ NAMES = (
 LEGS = (*[None] * quantities.L1, *(0, 1, 2, 3), *(0, 3, 0, 1, 2, 3))
 SIGNS = (quantities.DELTA1, quantities.DELTA2, quantities.DELTA3, quantities.ORDER)
 # Share of its range by which a slider goes on beyond either end.
-BEYOND = 0.1
+OVERRUN = 0.1
 # Colours of the bodies, as in the scene of the explorer's own page.
-BODIES = {
+BODY_COLOURS = {
     "tube": (84, 96, 114),
     "rod": (188, 197, 209),
     "joint": (52, 60, 72),
@@ -107,7 +107,7 @@ def page_data(design: Design) -> dict[str, Any]:
         "axes": axes.tolist(),
         "radii": radii.tolist(),
         "spans": {
-            name: [unit * (low - BEYOND * (high - low)), unit * (high + BEYOND * (high - low))]
+            name: [unit * (low - OVERRUN * (high - low)), unit * (high + OVERRUN * (high - low))]
             # Limits that contradict each other leave a range whose ends are reversed.
             for name, (low, high) in {
                 **{name: sorted(span) for name, span in spans.items()},
@@ -115,7 +115,7 @@ def page_data(design: Design) -> dict[str, Any]:
             }.items()
         },
         "colours": {
-            **BODIES,
+            **BODY_COLOURS,
             "singular": colours.SINGULAR,
             "warned": colours.WARNED,
             "clear": colours.CLEAR,

@@ -100,7 +100,7 @@ def test_moving_page_has_the_numbers_of_python(page: Page, tmp_path: Path, seed:
     rows = np.concatenate([position, rotation.reshape(-1, 9)], axis=1).tolist()
     names = f"({{ limits, collisions }}) => [...limits.map(({{ index }}) => {list(NAMES)}[index])"
     names += ", ...(collisions.length ? ['collision'] : [])]"
-    broken = call(page, f"row => ({names})(m.broken({pose}))", rows)
+    broken = call(page, f"row => ({names})(m.violations({pose}))", rows)
     assert [set(each) for each in broken] == limits_in_python(design, position, rotation)
 
 

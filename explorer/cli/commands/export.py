@@ -39,7 +39,7 @@ What = Literal[
 
 # Typical width of a browser window over its height.
 ASPECT = 1.6
-OF_ALL = ("what", "out", "format", "design", "json")
+COMMON = ("what", "out", "format", "design", "json")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +134,7 @@ class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     def refuse_all_but(self, *names: str) -> None:
         """Refuse options that do not apply to the object to write."""
         for field in dataclasses.fields(self):
-            if field.name not in (*OF_ALL, *names) and getattr(self, field.name) != field.default:
+            if field.name not in (*COMMON, *names) and getattr(self, field.name) != field.default:
                 raise InputError(f"--{field.name.replace('_', '-')} is not for {self.what}")
 
 

@@ -77,7 +77,7 @@ window.startPage = (design) => {
     return of[tab].map((value, i) => (HALF[TABS[tab][i]] ? value / DEGREE : value));
   };
   // The pose after one value of a tab is changed, as arguments of `take`; null if there is none.
-  const changed = (tab, index, value) => {
+  const poseAfter = (tab, index, value) => {
     const all = values(tab).with(index, value);
     const raw = all.map((each, i) => (HALF[TABS[tab][i]] ? each * DEGREE : each));
     if (tab === "pose") {
@@ -104,18 +104,18 @@ window.startPage = (design) => {
     say();
     const most = HALF[TABS[tab][index]] ? 360 : 100 * reach;
     const value = Math.max(-most, Math.min(most, given));
-    let next = changed(tab, index, value);
+    let next = poseAfter(tab, index, value);
     if (!next) {
       const name = TABS[tab][index];
       let [good, bad] = [values(tab)[index], value];
       for (let tries = 0; tries < 50; tries += 1) {
         const middle = 0.5 * (good + bad);
-        if (changed(tab, index, middle)) good = middle;
+        if (poseAfter(tab, index, middle)) good = middle;
         else bad = middle;
       }
       const end = `${value > good ? "at most" : "at least"} ${write(good)} mm`;
       say(`With the other five as they are ${name} is ${end}: beyond it the legs do not close.`);
-      next = changed(tab, index, good);
+      next = poseAfter(tab, index, good);
     }
     if (next) take(...next);
   };
@@ -186,8 +186,8 @@ window.startPage = (design) => {
   const trackOf = (index, [low, high]) => {
     const stops = [];
     for (let k = 0; k < SAMPLES; k += 1) {
-      const next = changed(state.tab, index, low + ((k + 0.5) / SAMPLES) * (high - low));
-      const keeps = next && isValid(mechanism.broken(next[0]));
+      const next = poseAfter(state.tab, index, low + ((k + 0.5) / SAMPLES) * (high - low));
+      const keeps = next && isValid(mechanism.violations(next[0]));
       const colour = keeps ? "var(--tint)" : "transparent";
       stops.push(`${colour} ${(100 * k) / SAMPLES}% ${(100 * (k + 1)) / SAMPLES}%`);
     }
@@ -239,7 +239,7 @@ window.startPage = (design) => {
       <circle cx="-24" r="3" fill="${css(colours.singular)}" /></svg>`;
   };
   const showAnswers = () => {
-    const found = mechanism.broken(state.pose);
+    const found = mechanism.violations(state.pose);
     const sizes = state.margins.map(Math.abs);
     const least = sizes.indexOf(Math.min(...sizes));
     const level = sizes[least] / design.warn;

@@ -198,7 +198,7 @@ window.flagged44 = (design) => {
 
   // The broken limits of a pose: { index, value, above } of quantities, and the pairs of legs that
   // collide.
-  const broken = (pose) => {
+  const violations = (pose) => {
     const limits = [];
     quantities(pose).forEach((value, index) => {
       const { low, high } = design.limits[index];
@@ -215,6 +215,6 @@ window.flagged44 = (design) => {
 
   const vectors = { dot, along, minus, length, cross, column, turn };
   const modes = { modeOf, signsOf, pairs };
-  const poses = { place, legs, inverse, margins, fromFolds, toFolds, forward, quantities, broken };
-  return { ...vectors, ...modes, ...poses };
+  const poses = { place, legs, inverse, margins, fromFolds, toFolds, forward };
+  return { ...vectors, ...modes, ...poses, quantities, violations };
 };

@@ -1,6 +1,6 @@
 // The scene: meshes that WebGL draws, with a camera that pointers and keys turn, and labels above.
-// `changed` is called when the camera has moved; draw again then.
-window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed) => {
+// `redraw` is called when the camera has moved; draw again then.
+window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, redraw) => {
   // What is drawn is kept, or it would be black on paper.
   const settings = { alpha: false, antialias: true, stencil: true, preserveDrawingBuffer: true };
   const gl = canvas.getContext("webgl2", settings);
@@ -15,8 +15,8 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
   const blend = (...terms) => terms.reduce((sum, [share, a]) => along(sum, share, a), [0, 0, 0]);
 
   // --- Meshes: vertices of position, normal and colour; one without a normal has its colour as it is.
-  const growing = () => ({ data: new Float32Array(1 << 17), used: 0 });
-  const solid = growing();
+  const newMesh = () => ({ data: new Float32Array(1 << 17), used: 0 });
+  const solid = newMesh();
   let [casting, panes] = [0, []];
 
   const write = (list, ...numbers) => {
@@ -229,7 +229,7 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
       camera.distance = Math.max(camera.distance, (0.54 * (ends[0] + ends[1])) / slope);
       camera.target = along(camera.target, 0.5 * (ends[0] - ends[1]), axis);
     }
-    changed();
+    redraw();
   };
 
   // Whether some points are all in the picture.
@@ -244,17 +244,17 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
   const rotate = (x, y) => {
     camera.azimuth -= x;
     camera.elevation = Math.min(1.55, Math.max(-1.55, camera.elevation + y));
-    changed();
+    redraw();
   };
   const zoom = (factor) => {
     camera.distance *= factor;
-    changed();
+    redraw();
   };
   const pan = (x, y) => {
     const { right, up } = axesOf();
     const scale = (2 * HALF_VIEW * camera.distance) / sizeOf()[1];
     camera.target = along(along(camera.target, -x * scale, right), y * scale, up);
-    changed();
+    redraw();
   };
 
   const pointers = new Map();
@@ -375,7 +375,7 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
   canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
   canvas.addEventListener("webglcontextrestored", () => {
     programs = setUp();
-    changed();
+    redraw();
   });
 
   // Draw the meshes on the ground at a height, with a grid of cells, in the colours of the theme:
@@ -429,7 +429,7 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, changed)
     gl.enable(gl.BLEND);
     gl.depthMask(false);
     const sorted = panes.toSorted((a, b) => dot(a.centre, back) - dot(b.centre, back));
-    const translucent = growing();
+    const translucent = newMesh();
     for (const { corners, colour } of sorted)
       polygon(translucent, corners, [0, 0, 0], inkOf(colour));
     load(translucent);
