@@ -113,14 +113,16 @@ class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
 
     def run(self) -> None:
         """Write the file, and its measures to standard output."""
-        file_format = self.format or _FOLDERS.get(self.what) or self.out.suffix.lower()[1:]
+        is_folder = self.what in _FOLDERS
+        default = _FOLDERS[self.what][1] if is_folder else self.out.suffix.lower()[1:]
+        file_format = self.format or default
         if not file_format:
             raise InputError(
                 f"--out {str(self.out)!r} has no suffix that names the format: give --format"
             )
         write, options = _WRITERS[self.what]
         self.refuse_all_but(*options)
-        if self.what not in _FOLDERS:
+        if not is_folder:
             check_writable(self.out)
         data, facts = write(self, file_format)
         if isinstance(data, bytes):
@@ -250,8 +252,7 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
 
 def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    if file_format not in ("html", "htm"):
-        raise InputError(f"no format {file_format!r} of the scene; there is html")
+    _check_format(file_format, "scene", "html", "htm")
     design = command.read_design()
     pose = command.pose(design)
     from explorer.app.features.sharing.scene_files import FileCamera, scene_html
@@ -270,22 +271,13 @@ def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
 
 def _page(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    if file_format not in ("html", "htm"):
-        raise InputError(f"no format {file_format!r} of the page; there is html")
+    _check_format(file_format, "page", "html", "htm")
     data = moving_page(command.read_design())
     return data, {"format": "html", "bytes": len(data)}
 
 
-def _kernel(command: Export, file_format: str) -> tuple[dict[str, bytes], Facts]:
-    if file_format != "c":
-        raise InputError(f"no format {file_format!r} of the kernel; there is c")
-    files = kernel_files(command.read_design())
-    return files, {"format": "c", "files": list(files)}
-
-
 def _figure(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    if file_format != "svg":
-        raise InputError(f"no format {file_format!r} of the figure; there is svg")
+    _check_format(file_format, "figure", "svg")
     design = command.read_design()
     snapshot = evaluate(design, command.pose(design))
     from explorer.app.scene.camera import framing, has_perspective
@@ -297,16 +289,25 @@ def _figure(command: Export, file_format: str) -> tuple[bytes, Facts]:
     return data, {"format": "svg", "bytes": len(data)}
 
 
-def _linuxcnc(command: Export, file_format: str) -> tuple[dict[str, bytes], Facts]:
-    if file_format != "ini":
-        raise InputError(f"no format {file_format!r} of the configuration; there is ini")
-    files = linuxcnc_files(command.read_design())
-    return files, {"format": "ini", "files": list(files)}
+def _folder(command: Export, file_format: str) -> tuple[dict[str, bytes], Facts]:
+    name, only, files_of = _FOLDERS[command.what]
+    _check_format(file_format, name, only)
+    files = files_of(command.read_design())
+    return files, {"format": only, "files": list(files)}
+
+
+def _check_format(file_format: str, name: str, only: str, suffix: str | None = None) -> None:
+    """Refuse another format of an object than its only one, which may have a second suffix."""
+    if file_format not in (only, suffix):
+        raise InputError(f"no format {file_format!r} of the {name}; there is {only}")
 
 
 _ORIENTATION = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
-_FOLDERS = {"kernel": "c", "linuxcnc": "ini"}
-"""The format of each object that is a folder of files."""
+_FOLDERS: dict[What, tuple[str, str, Callable[[Design], dict[str, bytes]]]] = {
+    "kernel": ("kernel", "c", kernel_files),
+    "linuxcnc": ("configuration", "ini", linuxcnc_files),
+}
+"""Of each object that is a folder: its name in words, its format, and what gives its files."""
 _WRITERS: dict[What, tuple[Callable[[Export, str], tuple[Data, Facts]], tuple[str, ...]]] = {
     "workspace": (_mesh, ("tolerance", "load", *_ORIENTATION)),
     "hull": (_mesh, ("tolerance", "load", *_ORIENTATION)),
@@ -318,8 +319,8 @@ _WRITERS: dict[What, tuple[Callable[[Export, str], tuple[Data, Facts]], tuple[st
         _figure,
         ("position", "folds", *_ORIENTATION, "view", "width", "black", "tetrahedra"),
     ),
-    "kernel": (_kernel, ()),
-    "linuxcnc": (_linuxcnc, ()),
+    "kernel": (_folder, ()),
+    "linuxcnc": (_folder, ()),
 }
 """The function that writes each object, and its options besides those of all."""
 
