@@ -34,18 +34,6 @@ LEGS = (*[None] * quantities.L1, *(0, 1, 2, 3), *(0, 3, 0, 1, 2, 3))
 SIGNS = (quantities.DELTA1, quantities.DELTA2, quantities.DELTA3, quantities.ORDER)
 # Share of its range by which a slider goes on beyond either end.
 OVERRUN = 0.1
-# Colours of the bodies, as in the scene of the explorer's own page.
-BODY_COLOURS = {
-    "tube": (84, 96, 114),
-    "rod": (188, 197, 209),
-    "joint": (52, 60, 72),
-    "ball": (232, 235, 240),
-    "base": (214, 219, 226),
-    "platform": (150, 160, 176),
-    "rail": (128, 138, 152),
-    "carriage": (104, 115, 132),
-    "leaves": ((176, 156, 112), (96, 140, 136)),
-}
 
 
 def moving_page(design: Design) -> bytes:
@@ -115,7 +103,15 @@ def page_data(design: Design) -> dict[str, Any]:
             }.items()
         },
         "colours": {
-            **BODY_COLOURS,
+            "tube": colours.TUBE,
+            "rod": colours.ROD,
+            "joint": colours.JOINT,
+            "ball": colours.BALL,
+            "base": colours.BASE_BODY,
+            "platform": colours.PLATFORM_BODY,
+            "rail": colours.RAIL,
+            "carriage": colours.CARRIAGE,
+            "leaves": colours.LEAVES,
             "singular": colours.SINGULAR,
             "warned": colours.WARNED,
             "clear": colours.CLEAR,

@@ -1,8 +1,8 @@
-"""The colour scale of the proximity to a singularity, and the colours of the three margins.
+"""Colours of the mechanism: of its bodies, of the proximity to a singularity, of the three margins.
 
-The scale is orange below the warning value and blue above it, a pair that is distinct in every
-common colour-vision deficiency. Both ends darken, so that the scale is legible in grey as well:
-dark orange is singular, dark blue is far away.
+The scale of proximity is orange below the warning value and blue above it, a pair that is distinct
+in every common colour-vision deficiency. Both ends darken, so that the scale is legible in grey as
+well: dark orange is singular, dark blue is far away.
 
 A margin has a hue of its own, which says which margin it is and nothing of danger. The three are
 distinct from each other, from the scale and from the colours of compared designs, and the name of
@@ -21,6 +21,17 @@ CLEAR: Rgb = (112, 172, 220)
 FAR: Rgb = (24, 74, 150)
 # Colour of colliding legs and bodies.
 OUTLINE: Rgb = (190, 24, 60)
+
+# Colours of bodies and of the two leaves of the folds, in the scene and in the moving page.
+TUBE: Rgb = (84, 96, 114)
+ROD: Rgb = (188, 197, 209)
+JOINT: Rgb = (52, 60, 72)
+BALL: Rgb = (232, 235, 240)
+BASE_BODY: Rgb = (214, 219, 226)
+PLATFORM_BODY: Rgb = (150, 160, 176)
+RAIL: Rgb = (128, 138, 152)
+CARRIAGE: Rgb = (104, 115, 132)
+LEAVES: tuple[Rgb, Rgb] = ((176, 156, 112), (96, 140, 136))
 
 MARGIN_COLOURS: tuple[Rgb, Rgb, Rgb] = ((180, 0, 240), (255, 75, 150), (90, 135, 90))
 """Colours of lines and marks of δ1, δ2 and δ3, visible on light and dark pages alike."""

@@ -37,7 +37,7 @@ from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.features.workspace.slice_map import SliceMap
 from explorer.app.features.workspace.words import drawing_words, nothing_words, workspace_details
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import SWEPT, TUBE
+from explorer.app.scene.shapes import SWEPT
 from explorer.app.scene.surfaces import COLLIDING, PLAIN
 from explorer.app.session.history import UserAction
 from explorer.app.state.actions import Set, SetPose, SetPosition
@@ -56,7 +56,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import OUTLINE
+from explorer.singularity.colours import OUTLINE, TUBE
 from explorer.workspace.accessible.nodes import StartError, check_start
 from explorer.workspace.accessible.radii import RadiusCurve
 from explorer.workspace.accessible.workspace import accessible_workspace

@@ -22,16 +22,7 @@ from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.singularity.colours import Rgb, linear
 
 # Colours of the scene, besides those of `explorer.singularity.colours`.
-TUBE: Rgb = (84, 96, 114)
-ROD: Rgb = (188, 197, 209)
-JOINT: Rgb = (52, 60, 72)
-BALL: Rgb = (232, 235, 240)
-BASE_BODY: Rgb = (214, 219, 226)
-PLATFORM_BODY: Rgb = (150, 160, 176)
-RAIL: Rgb = (128, 138, 152)
-CARRIAGE: Rgb = (104, 115, 132)
 GHOST: Rgb = NEUTRAL
-LEAVES: tuple[Rgb, Rgb] = ((176, 156, 112), (96, 140, 136))
 SWEPT: Rgb = (92, 60, 156)
 # Colours of the live design and of the pinned ones: distinct for every common colour-vision
 # deficiency, from the scale of proximity, and from light and dark pages.

@@ -24,6 +24,7 @@ from explorer.legs.clearance import legs_of
 from explorer.measures.snapshot import Snapshot
 from explorer.numerics.arrays import FloatArray
 from explorer.reproduce.six_legs import TWIN
+from explorer.singularity import colours
 from explorer.singularity.colours import OUTLINE, Rgb, proximity_colour
 
 # Sizes in scene units.
@@ -60,9 +61,9 @@ class Bodies(ScenePart):
         scene = services.scene
         # Whatever is rigid with the platform has this frame as its parent.
         self._frame = scene.add_frame("/platform", show_axes=False)
-        self._base = scene.add_mesh_simple("/base/body", *shapes.NO_MESH, color=shapes.BASE_BODY)
+        self._base = scene.add_mesh_simple("/base/body", *shapes.NO_MESH, color=colours.BASE_BODY)
         self._platform = scene.add_mesh_simple(
-            "/platform/body", *shapes.NO_MESH, color=shapes.PLATFORM_BODY, side="double"
+            "/platform/body", *shapes.NO_MESH, color=colours.PLATFORM_BODY, side="double"
         )
 
     def updates(self, placed: Placed) -> Updates:
@@ -150,21 +151,21 @@ class Telescopes(shapes.Rods):
 
 def _colours_of_parts(alarms: list[bool]) -> list[Rgb]:
     """Return the colours of the parts of actuators, some of which have that of an alarm."""
-    tubes = [OUTLINE if alarm else shapes.TUBE for alarm in alarms]
-    rods = [OUTLINE if alarm else shapes.ROD for alarm in alarms]
-    return [*tubes, *rods, *[shapes.JOINT] * (2 * len(alarms))]
+    tubes = [OUTLINE if alarm else colours.TUBE for alarm in alarms]
+    rods = [OUTLINE if alarm else colours.ROD for alarm in alarms]
+    return [*tubes, *rods, *[colours.JOINT] * (2 * len(alarms))]
 
 
 class Legs(ScenePart):
     """The four legs with their joints, carriages and guide."""
 
     def __init__(self, services: Services) -> None:
-        scene, joint, rod = services.scene, shapes.JOINT, shapes.ROD
+        scene, joint, rod = services.scene, colours.JOINT, colours.ROD
         self._actuators = Telescopes(scene, "/legs/actuators", 4)
         # A post and two pins for each U joint, and a sleeve about the guide for each carriage.
         self._joints = shapes.Rods(scene, "/legs/joints", [joint, rod, rod] * 2 + [joint] * 2)
-        self._balls = shapes.Balls(scene, "/legs/balls", [shapes.BALL] * 4 + [joint] * 2)
-        boxes = [shapes.RAIL, shapes.CARRIAGE, shapes.CARRIAGE]
+        self._balls = shapes.Balls(scene, "/legs/balls", [colours.BALL] * 4 + [joint] * 2)
+        boxes = [colours.RAIL, colours.CARRIAGE, colours.CARRIAGE]
         self._guide = shapes.Boxes(scene, "/legs/guide", boxes)
 
     def updates(self, placed: Placed) -> Updates:
@@ -211,9 +212,9 @@ class TwinLegs(ScenePart):
     """The six legs of the 6-4 twin, which start at a1 and a2 instead of the carriages."""
 
     def __init__(self, services: Services) -> None:
-        scene, joints = services.scene, [shapes.JOINT] * 3
+        scene, joints = services.scene, [colours.JOINT] * 3
         self._actuators = Telescopes(scene, "/twin/actuators", len(TWIN))
-        self._balls = shapes.Balls(scene, "/twin/balls", joints + [shapes.BALL] * 4)
+        self._balls = shapes.Balls(scene, "/twin/balls", joints + [colours.BALL] * 4)
         self._posts = shapes.Rods(scene, "/twin/posts", joints)
 
     def updates(self, placed: Placed) -> Updates:

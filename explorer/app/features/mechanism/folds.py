@@ -19,7 +19,7 @@ from explorer.app.features.feature import Services, show
 from explorer.app.inputs.controls import Controls, item
 from explorer.app.inputs.ranges import Span, length_span
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import LEAVES, add_label, add_lines, add_translucent, of_one_colour
+from explorer.app.scene.shapes import add_label, add_lines, add_translucent, of_one_colour
 from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, SetFold
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -28,7 +28,14 @@ from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.margins import signs_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals
-from explorer.singularity.colours import FAR_WARNINGS, MARGIN_COLOURS, Rgb, css, proximity_colour
+from explorer.singularity.colours import (
+    FAR_WARNINGS,
+    LEAVES,
+    MARGIN_COLOURS,
+    Rgb,
+    css,
+    proximity_colour,
+)
 
 HINTS = (
     "The distance of a1 and b4. All three margins grow with it.",

@@ -15,7 +15,7 @@ from explorer.app.features.prototype.work import PARTS_FEED, Parts, PartsFeed, p
 from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.scene.shapes import BALL, CARRIAGE, NO_MESH, PLATFORM_BODY, RAIL, ROD, TUBE
+from explorer.app.scene.shapes import NO_MESH
 from explorer.app.scene.surfaces import Drawn
 from explorer.app.session.session import Who
 from explorer.app.state.actions import draw_as
@@ -30,7 +30,16 @@ from explorer.numerics.number_text import format_decimals, format_number
 from explorer.prototype.assembly import exploded_offsets
 from explorer.prototype.chains import BODIES, LEGS, Places
 from explorer.prototype.fitting import broken_joint_limits, buildability
-from explorer.singularity.colours import OUTLINE, Rgb
+from explorer.singularity.colours import (
+    BALL,
+    CARRIAGE,
+    OUTLINE,
+    PLATFORM_BODY,
+    RAIL,
+    ROD,
+    TUBE,
+    Rgb,
+)
 
 # Format of each file by its name on the page, and end of the name of the file.
 ASSEMBLIES = {
