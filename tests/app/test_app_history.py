@@ -27,6 +27,7 @@ from explorer.app.server import Running
 from explorer.app.session import history
 from explorer.app.session.history import (
     PAUSE_SECONDS,
+    History,
     UserAction,
     restore,
     start_history,
@@ -253,6 +254,23 @@ def test_session_undoes_and_redoes_exactly(desk: Desk) -> None:
     assert state_of_step(desk.state) == state_of_step(last)
     desk.session.do(move_to(1))
     assert desk.state.design.variables[0] == 15.0
+
+
+def test_thread_that_sees_a_new_state_finds_its_step(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = desk.state
+    seen: list[State] = []
+    record = History.record
+
+    def watch(self: History, event: UserAction, state: State) -> History:
+        seen.append(desk.session.state)
+        return record(self, event, state)
+
+    monkeypatch.setattr(History, "record", watch)
+    desk.session.do(SetVariable("a3x", 15.0))
+    assert desk.state != before
+    assert seen == [before]
 
 
 VIEWS: list[Action] = [

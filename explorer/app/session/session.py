@@ -203,7 +203,7 @@ class Session:
         if isinstance(item.change, HistoryMove):
             history = item.change.move(self._history)
             undone = self._history.steps[history.at + 1 : self._history.at + 1]
-            self._state, self._history = restore(history, self._state)
+            self._hold(*restore(history, self._state))
             # The first step of each other client.
             for who, words in {each.who: each.words for each in undone[::-1]}.items():
                 if item.who is not None and who not in (None, item.who):
@@ -214,8 +214,13 @@ class Session:
         if action is None:
             return
         event = UserAction(action, item.key, item.stamp, press, item.who)
-        self._state = event.apply(self._state)
-        self._history = self._history.record(event, self._state)
+        state = event.apply(self._state)
+        self._hold(state, self._history.record(event, state))
+
+    def _hold(self, state: State, history: History) -> None:
+        # The history first: a thread that sees the new state finds its step.
+        self._history = history
+        self._state = state
 
 
 def message_of(error: ExplorerError) -> str:
