@@ -22,7 +22,7 @@ from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.prototype.chains import BODIES, Chains
-from explorer.prototype.weights import Mass, machine_weights, total_mass
+from explorer.prototype.weights import Mass, machine_weights, with_payload
 from explorer.statics.compliance import softness_with_struts
 from explorer.statics.forces import actuator_forces, twists_of_actuators
 from explorer.statics.weights import carry
@@ -136,13 +136,6 @@ def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> S
         stiffness = FREQUENCY**2 * inertia
     rotors = np.maximum(inertia, stiffness / FREQUENCY**2)
     return Servos(stiffness, 2.0 * np.sqrt(stiffness * rotors), rotors, weights, forces)
-
-
-def with_payload(design: Design, masses: Mapping[str, Mass]) -> Mapping[str, Mass]:
-    """Return the masses of the bodies, the design's payload being part of the platform."""
-    centre = 1e-3 * design.unit_mm * np.array(design.payload.centre)
-    payload = Mass(design.payload.mass_kg, centre, np.zeros((3, 3)))
-    return {**masses, "platform": total_mass([masses["platform"], payload])}
 
 
 def joint_inertia(design: Design, masses: Mapping[str, Mass]) -> FloatArray:

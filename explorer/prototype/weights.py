@@ -76,6 +76,9 @@ def mesh_mass(vertices: FloatArray, faces: NDArray[np.int32], density: float) ->
     return Mass(float(found["mass"]), found["center_mass"], found["inertia"])
 
 
+DENSITY = 1240.0
+"""The default density of the bodies, in kg/m³: that of printed PLA."""
+
 DEFAULT_RADIUS = 0.01
 """Radius, over the reach, of a leg that has none in the design."""
 
@@ -88,6 +91,13 @@ ROD, JOINT, BALL = 0.6, 2.0, 1.2
 def leg_radii(design: Design) -> tuple[float, ...]:
     """Return the radii of the four legs, all positive, in design units."""
     return tuple(radius or DEFAULT_RADIUS * design.reach for radius in design.limits.leg_radii)
+
+
+def with_payload(design: Design, masses: Mapping[str, Mass]) -> Mapping[str, Mass]:
+    """Return the masses of the bodies, the design's payload being part of the platform."""
+    centre = 1e-3 * design.unit_mm * np.array(design.payload.centre)
+    payload = Mass(design.payload.mass_kg, centre, np.zeros((3, 3)))
+    return {**masses, "platform": total_mass([masses["platform"], payload])}
 
 
 def machine_weights(design: Design, masses: Mapping[str, Mass], *, payload: bool = True) -> Weights:

@@ -198,7 +198,7 @@ def _signed(c: Configuration, forces: FloatArray, carried: Carried) -> FloatArra
     for leg, row in zip((1, 2), STRUT_ROWS, strict=True):
         radial = forces[..., row, None]
         # The weight of the leg acts on the guide, less what the platform carries of it.
-        own = carried.legs[leg, 1:] - carried.at_joints[..., leg, 1:]
+        own = carried.legs[..., leg, 1:] - carried.at_joints[..., leg, 1:]
         ok, axis = np.isfinite(radial), c.leg_directions[..., leg, 1:]
         across.append(np.where(ok, own - np.where(ok, radial, 0.0) * axis, np.inf))
     return _join(forces.shape[:-1], forces, moments, *across)

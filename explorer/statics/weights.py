@@ -66,7 +66,7 @@ NO_WEIGHTS = Weights()
 
 @dataclass(frozen=True)
 class Carried:
-    """What weights do in some poses.
+    """What weights do in some poses, or weights and inertia in motions.
 
     Attributes:
         wrench: (F; M) on the platform at the tool point, base axes, that stands for all weights,
@@ -74,7 +74,8 @@ class Carried:
         at_joints: Parts of it that stand for the legs, at b1 to b4, shape (..., 4, 3), in N.
         along_guide: Moments by which the weights of legs 2 and 3 change those of the forces of d1
             and d3 at the carriages, shape (..., 2), in N × unit.
-        legs: Weights of the legs, carriages included, shape (4, 3), in N.
+        legs: Weights of the legs, carriages included, shape (4, 3), or (..., 4, 3) in motions, in
+            N.
     """
 
     wrench: FloatArray

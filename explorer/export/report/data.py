@@ -13,7 +13,6 @@ from typing import TypeVar
 import numpy as np
 
 from explorer.errors import ExplorerError, NoAnswerError
-from explorer.export.simulation import DENSITY
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.measures.snapshot import Snapshot, evaluate
@@ -21,6 +20,7 @@ from explorer.mechanism.machine import Payload, Tool
 from explorer.numerics.arrays import triple
 from explorer.optimise.outcome import Record
 from explorer.prototype.assembly import Bill, bill_of_materials, make_prototype
+from explorer.prototype.weights import DENSITY
 from explorer.statics.compliance import largest_deflection
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_workspace
