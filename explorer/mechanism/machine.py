@@ -92,8 +92,12 @@ class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Data of the six actuators, each six numbers in the order of `JOINTS`.
 
     Attributes:
-        push_n: Largest force that increases the joint's value, in newtons; None for no limit.
+        push_n: Largest force that increases the joint's value, if only for a moment, in newtons;
+            None for no limit.
         pull_n: Largest force that decreases it, in newtons; None for the same as `push_n`.
+        continuous_n: Largest root-mean-square force over a motion, in newtons; None for no limit.
+        speed_mm_s: Largest speed, in millimetres per second; None for no limit.
+        acceleration_mm_s2: Largest acceleration, in millimetres per s²; None for no limit.
         error_mm: Largest positioning error to either side, in millimetres.
         stiffness_n_mm: Stiffness, in newtons per millimetre; None for rigid actuators.
 
@@ -106,11 +110,14 @@ class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pull_n: Six | None = None
     error_mm: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     stiffness_n_mm: Six | None = None
+    continuous_n: Six | None = None
+    speed_mm_s: Six | None = None
+    acceleration_mm_s2: Six | None = None
 
     def __post_init__(self) -> None:
-        for name in ("push_n", "pull_n", "stiffness_n_mm"):
+        for name in self.__struct_fields__:
             values = getattr(self, name)
-            if values is not None:
+            if values is not None and name != "error_mm":
                 field = f"actuators.{name}"
                 most = STIFFEST if name == "stiffness_n_mm" else MOST
                 given = numbers(field, values, 6, most)

@@ -100,6 +100,9 @@ PLAIN: list[tuple[str, object, Callable[[Design], object]]] = [
     ("Limited guide force", True, lambda design: design.guide.force_n),
     ("Limited guide moment", True, lambda design: design.guide.moment_nm),
     ("Error of each (mm)", 0.02, lambda design: design.actuators.error_mm[3]),
+    ("Limited continuous force", True, lambda design: design.actuators.continuous_n),
+    ("Limited speed", True, lambda design: design.actuators.speed_mm_s),
+    ("Limited acceleration", True, lambda design: design.actuators.acceleration_mm_s2),
     ("Elastic", True, lambda design: design.actuators.stiffness_n_mm),
     ("a3 (± mm)", (0.1, 0.2, 0.0), lambda design: design.tolerances.a3),
     ("guide tilt z (± °)", 0.05, lambda design: design.tolerances.guide_tilt_deg[1]),
@@ -153,6 +156,21 @@ def test_limits_are_switched_on_set_and_switched_off(hand: Hand) -> None:
     assert hand.set("Largest moment on it (N m)", 6.0).guide == Guide(7.0, 6.0)
     hand.set("Limited guide force", False)
     assert hand.set("Limited guide moment", False).guide == Guide()
+
+
+def test_limits_of_motion_start_with_typical_values_and_are_told(hand: Hand) -> None:
+    for label in ("Limited forces", "Limited continuous force", "Limited speed"):
+        hand.set(label, True)
+    design = hand.set("acceleration of l4 (mm/s²)", 500.0)
+    limits = Actuators(
+        push_n=six(100.0),
+        continuous_n=six(100.0),
+        speed_mm_s=six(200.0),
+        acceleration_mm_s2=(*six(2000.0)[:5], 500.0),
+    )
+    assert design.actuators == limits
+    words = machine_words(design)
+    assert "continuous forces up to 100 N; speeds up to 200 mm/s; accelerations up to 500–" in words
 
 
 def test_field_of_a_limit_is_visible_only_while_the_limit_is_on(hand: Hand) -> None:

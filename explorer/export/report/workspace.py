@@ -181,10 +181,16 @@ def _payload(data: ReportData) -> Element:
 def _limits(data: ReportData) -> Element:
     actuators, struts, guide = data.design.actuators, data.design.struts, data.design.guide
     rows: list[Row] = [
-        (name, "no limit" if six is None else markup.range_of(six, " N", 4))
-        for name, six in (
-            ("push of an actuator, at most", actuators.push_n),
-            ("pull of an actuator, at most", actuators.pull_n or actuators.push_n),
+        (
+            f"{name} of an actuator, at most",
+            markup.range_of(six, f" {unit}", 4) if six else "no limit",
+        )
+        for name, unit, six in (
+            ("push", "N", actuators.push_n),
+            ("pull", "N", actuators.pull_n or actuators.push_n),
+            ("continuous force", "N", actuators.continuous_n),
+            ("speed", "mm/s", actuators.speed_mm_s),
+            ("acceleration", "mm/s²", actuators.acceleration_mm_s2),
         )
     ]
     if struts.outer_mm is not None:

@@ -1,9 +1,9 @@
-"""The controls of the six actuators: forces, positioning errors and stiffness."""
+"""The controls of the six actuators: forces, speeds, positioning errors and stiffness."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import viser
@@ -20,6 +20,9 @@ from explorer.numerics.number_text import format_number
 # A limit of the forces that is switched on begins with this, in N.
 FORCE = 100.0
 FORCES: Six = (FORCE, FORCE, FORCE, FORCE, FORCE, FORCE)
+# Those of speeds and accelerations begin with these, in mm/s and mm/s².
+SPEEDS: Six = (200.0, 200.0, 200.0, 200.0, 200.0, 200.0)
+ACCELERATIONS: Six = (2000.0, 2000.0, 2000.0, 2000.0, 2000.0, 2000.0)
 # Steps of number fields, which show no more decimals.
 FINE, MEDIUM = 0.001, 0.01
 
@@ -101,13 +104,15 @@ class Quantity(NamedTuple):
         unit: Its unit.
         meaning: Beginning of the sentence on it.
         step: Step of its fields.
+        start: Six numbers to begin with; None for those of the push.
     """
 
-    name: Literal["push_n", "pull_n", "error_mm", "stiffness_n_mm"]
+    name: str
     word: str
     unit: str
     meaning: str
     step: float
+    start: Six | None = None
 
     @property
     def path(self) -> str:
@@ -120,16 +125,40 @@ class Quantity(NamedTuple):
 
     def first(self, state: State) -> Six:
         """Return the six numbers; where there are none, those to begin with."""
-        given = self.given(state)
-        if given is not None:
-            return given
-        return STIFFNESSES if self is STIFF else PUSH.given(state) or FORCES
+        return self.given(state) or self.start or PUSH.given(state) or FORCES
 
 
 PUSH = Quantity("push_n", "push", "N", "Largest force that increases a joint's value", MEDIUM)
 PULL = Quantity("pull_n", "pull", "N", "Largest force that decreases it", MEDIUM)
+CONTINUOUS = Quantity(
+    "continuous_n", "continuous force", "N", "Largest root-mean-square force of a motion", MEDIUM
+)
+SPEED = Quantity("speed_mm_s", "speed", "mm/s", "Largest speed to either side", 1.0, SPEEDS)
+ACCELERATION = Quantity(
+    "acceleration_mm_s2",
+    "acceleration",
+    "mm/s²",
+    "Largest acceleration to either side",
+    10.0,
+    ACCELERATIONS,
+)
 ERROR = Quantity("error_mm", "error", "mm", "Largest positioning error to either side", FINE)
-STIFF = Quantity("stiffness_n_mm", "stiffness", "N/mm", "Force along the joint per deflection", 1.0)
+STIFF = Quantity(
+    "stiffness_n_mm",
+    "stiffness",
+    "N/mm",
+    "Force along the joint per deflection",
+    1.0,
+    STIFFNESSES,
+)
+
+# Those that are None while a switch is off, with its words.
+SWITCHED = (
+    (CONTINUOUS, "Limited continuous force", "Limit what the actuators bear without end."),
+    (SPEED, "Limited speed", "Limit the speeds of the actuators."),
+    (ACCELERATION, "Limited acceleration", "Limit the accelerations of the actuators."),
+    (STIFF, "Elastic", "Give the actuators a stiffness; off, they are rigid."),
+)
 
 
 def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
@@ -148,16 +177,12 @@ def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
         is_possible=_is_limited,
     )
     _add_common(controls, PULL)
+    for quantity, label, hint in SWITCHED:
+        controls.switch(label, hint, quantity.path, quantity.first)
+        _add_common(controls, quantity)
     _add_common(controls, ERROR)
-    controls.switch(
-        "Elastic",
-        "Give the actuators a stiffness; off, they are rigid.",
-        STIFF.path,
-        STIFF.first,
-    )
-    _add_common(controls, STIFF)
     with gui.add_folder("Each of the six", expand_by_default=False):
-        for quantity in (PUSH, PULL, ERROR, STIFF):
+        for quantity in (PUSH, PULL, CONTINUOUS, SPEED, ACCELERATION, ERROR, STIFF):
             for index, joint in enumerate(JOINTS):
                 _add_one(controls, quantity, index, joint)
 
