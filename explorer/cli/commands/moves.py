@@ -24,7 +24,8 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.paths import planning
 from explorer.paths.crossings import path_margins
 from explorer.paths.loads import PathLoads, path_loads
-from explorer.paths.trajectory import Trajectory, trajectory
+from explorer.paths.time_law import law_at_speed
+from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
 from explorer.statics.reactions import LIMITED, PART_NAMES
 from explorer.workspace.slices.volume import node_step_of
 
@@ -194,6 +195,10 @@ class Path(options.JsonOptions, options.RadiiOptions, options.EndOptions, option
     speed: Annotated[values.Positive, values.hint("default: a tenth of the reach")] = None
     """Speed of the fastest actuator, in design units per second."""
 
+    acceleration: Annotated[values.Positive, values.hint("default: at the speed at once")] = None
+    """Acceleration with which the fastest actuator reaches this speed, and stops at every corner,
+    in design units per s²."""
+
     samples: Annotated[int, values.whole_number(2, 100_000)] = 201
     """Number of rows of the trajectory."""
 
@@ -221,7 +226,13 @@ class Path(options.JsonOptions, options.RadiiOptions, options.EndOptions, option
             if self.json:
                 output.write_json({"found": False, "reason": error.reason, "poses": []})
             raise
-        timed = trajectory(design, path.poses, speed=self.speed, samples=self.samples, tool=tool)
+        law = None
+        if self.acceleration is not None:
+            speed = self.speed or DEFAULT_SPEED * design.reach
+            law = law_at_speed(design, path.poses, speed, self.acceleration, tool=tool)
+        timed = trajectory(
+            design, path.poses, speed=self.speed, samples=self.samples, tool=tool, law=law
+        )
         loads = None
         if self.load is not None:
             loads = path_loads(design, path.poses, self.load, tool=tool)

@@ -1,0 +1,291 @@
+"""Time laws: how a path of straight moves is gone through in time, from rest to rest.
+
+A law keeps the geometry of its path, so that it stops at every corner: the actuators would need
+infinite accelerations to pass one. It is the rate of the share of a move at grid points, between
+which the second derivative of the share is constant. One law goes at a given speed with a limited
+acceleration, another in the shortest time that the limits of the actuators allow.
+
+With x the squared rate and u the change of the rate, speeds bound x, and accelerations and forces
+bound sums a u + b x. These bounds hold at both ends of every interval between grid points, in which
+x changes by 2 u times its length. What holds the path at rest is assumed to be within the limits,
+so that x may be anything from zero to a greatest value. Backwards from the end of a move, that
+value is the greatest from which the next one can be kept; forwards the rate then increases as much
+as it may (the reachability analysis of Pham and Pham, "A New Approach to Time-Optimal Path
+Parameterization Based on Reachability Analysis", 2018). Last, the law is slowed down by the little
+by which a grid ten times finer shows it to exceed a limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError, NoAnswerError
+from explorer.legs.moves import StraightMoves
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.statics.forces import forces_of
+from explorer.statics.motion import (
+    MovingBodies,
+    carry_motion,
+    joint_accelerations,
+    joint_rates,
+)
+
+DEFAULT_POINTS = 200
+# Least intervals of a move, and parts of an interval in which limits are checked.
+LEAST_INTERVALS, PARTS = 16, 10
+
+
+@dataclass(frozen=True)
+class TimeLaw:
+    """The place on a path over time; between grid points its second derivative is constant.
+
+    Attributes:
+        time: Time in seconds, from 0, shape (n,).
+        at: Place on the path: number of the move plus the share of it, shape (n,).
+        rate: Rate of the place, in 1/s, zero at every corner, shape (n,).
+    """
+
+    time: FloatArray
+    at: FloatArray
+    rate: FloatArray
+
+    @staticmethod
+    def of(rates: FloatArray) -> TimeLaw:
+        """Return the law with some rates at evenly spaced shares of moves, shape (moves, n)."""
+        count, points = rates.shape
+        rate = np.append(rates[:, :-1], 0.0)
+        at = np.linspace(0.0, count, len(rate), dtype=np.float64)
+        sums, steps = rate[1:] + rate[:-1], np.full(len(rate) - 1, 2.0 / (points - 1))
+        # A move without a length takes no time.
+        steps = np.divide(steps, sums, out=np.zeros(len(steps)), where=sums > 0.0)
+        return TimeLaw(np.append(0.0, np.cumsum(steps)), at, rate)
+
+    @property
+    def duration(self) -> float:
+        """Duration in seconds."""
+        return float(self.time[-1])
+
+    def slower(self, factor: float) -> TimeLaw:
+        """Return this law with all times multiplied by a factor."""
+        return replace(self, time=factor * self.time, rate=self.rate / factor)
+
+    def places(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return place, its rate and its second derivative at times (n,), each of shape (n,)."""
+        index = np.clip(np.searchsorted(self.time, time, "right") - 1, 0, len(self.time) - 2)
+        since, rate = time - self.time[index], self.rate[index]
+        change = np.diff(self.rate**2) / (2.0 * np.diff(self.at))
+        at = self.at[index] + rate * since + 0.5 * change[index] * since**2
+        ends = self.at[index], self.at[index + 1]
+        return np.clip(at, *ends), rate + change[index] * since, change[index]
+
+
+class Bounds(NamedTuple):
+    """What the limits of the actuators demand at places of a path: a u + b x ≤ most, x ≤ square.
+
+    Attributes:
+        a, b, most: Bounds of accelerations and forces to either side, shape (..., 24) each.
+        square: Largest x by the speeds, shape (...).
+    """
+
+    a: FloatArray
+    b: FloatArray
+    most: FloatArray
+    square: FloatArray
+
+
+def law_at_speed(
+    design: Design,
+    poses: Sequence[Pose],
+    speed: float,
+    acceleration: float,
+    *,
+    tool: ArrayLike | None = None,
+    points: int = DEFAULT_POINTS,
+) -> TimeLaw:
+    """Return the law by which the travel of the fastest actuator over each move is a trapezoid.
+
+    Args:
+        design: The manipulator.
+        poses: Corners of the path, two or more.
+        speed: Speed of the fastest actuator, in design units per second.
+        acceleration: Acceleration with which it reaches the speed and stops, in units/s².
+        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+            for b4.
+        points: Number of intervals of the grid over the whole path.
+
+    Raises:
+        InputError: There are too few poses, or the speed or the acceleration is not positive.
+    """
+    for name, value in (("speed", speed), ("acceleration", acceleration)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"the {name} must be above zero; got {value:g}")
+    moves, number, share = _grid(poses, tool, points)
+    position, rotation = moves.poses(number, share)
+    twist = moves.slopes(number, rotation)[0]
+    slopes = np.abs(joint_rates(design, position, rotation, twist)).max(axis=-1)
+    travel = np.zeros_like(slopes)
+    travel[:, 1:] = np.cumsum(slopes[:, 1:] + slopes[:, :-1], axis=1) / (2.0 * (len(share[0]) - 1))
+    rest = 2.0 * acceleration * np.minimum(travel, travel[:, -1:] - travel)
+    speeds = np.sqrt(np.clip(rest, 0.0, speed**2))
+    return TimeLaw.of(np.divide(speeds, slopes, out=np.zeros_like(slopes), where=slopes > 0.0))
+
+
+def law_of_shortest_time(
+    design: Design,
+    poses: Sequence[Pose],
+    *,
+    tool: ArrayLike | None = None,
+    bodies: MovingBodies | None = None,
+    points: int = DEFAULT_POINTS,
+) -> TimeLaw:
+    """Return the law of the shortest time within speeds, accelerations and forces of the actuators.
+
+    Args:
+        design: The manipulator, whose actuators have the limits.
+        poses: Corners of the path, two or more.
+        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+            for b4.
+        bodies: Masses that the forces accelerate and hold; None to leave the forces out.
+        points: Number of intervals of the grid over the whole path.
+
+    Raises:
+        InputError: There are too few poses, or no limit bounds the acceleration.
+        NoAnswerError: A weight exceeds the largest force of an actuator at rest, or the path is
+            singular.
+    """
+    moves, number, share = _grid(poses, tool, points)
+    bounds = _bounds(design, moves, number, share, bodies)
+    moving = (moves.step != 0.0).any(axis=1) | (moves.turn != 0.0).any(axis=1)
+    sides = np.sign(bounds.a) * np.isfinite(bounds.most)
+    if not ((sides.max(axis=-1) > 0.0) & (sides.min(axis=-1) < 0.0))[moving].all():
+        raise InputError(
+            "nothing limits the acceleration along the path: give the design a limit such as "
+            "actuators.acceleration_mm_s2, or actuators.push_n and masses to move"
+        )
+    squares = np.zeros(share.shape)
+    for move in np.flatnonzero(moving):
+        squares[move] = _greatest_squares(Bounds(*(each[move] for each in bounds)))
+    law = TimeLaw.of(np.sqrt(squares))
+    # Between grid points a limit may be exceeded by a little.
+    steps = np.linspace(0.0, 1.0, PARTS, endpoint=False, dtype=np.float64)
+    times = (law.time[:-1, None] + steps * np.diff(law.time)[:, None]).ravel()
+    at, rate, change = law.places(times[np.repeat(np.diff(law.time) > 0.0, PARTS)])
+    number = np.minimum(at.astype(np.int64), len(poses) - 2)
+    finer = _bounds(design, moves, number, at - number, bodies)
+    asked = (finer.a * change[:, None] + finer.b * rate[:, None] ** 2) / finer.most
+    excess = max(asked.max(initial=1.0), (rate**2 / finer.square).max(initial=1.0))
+    return law.slower(math.sqrt(excess))
+
+
+def _grid(
+    poses: Sequence[Pose], tool: ArrayLike | None, points: int
+) -> tuple[StraightMoves, IntArray, FloatArray]:
+    """Return the moves of a path, and number and share of grid points, shape (moves, n) each."""
+    if len(poses) < 2:
+        raise InputError("a time law needs a path of at least two poses")
+    moves, count = StraightMoves.along(poses, tool), len(poses) - 1
+    intervals = max(LEAST_INTERVALS, math.ceil(points / count))
+    share = np.linspace(0.0, 1.0, intervals + 1, dtype=np.float64)
+    number = np.repeat(np.arange(count)[:, None], len(share), axis=1)
+    return moves, number, np.tile(share, (count, 1))
+
+
+def _bounds(
+    design: Design,
+    moves: StraightMoves,
+    number: IntArray,
+    share: FloatArray,
+    bodies: MovingBodies | None,
+) -> Bounds:
+    """Return the bounds at shares of moves by number, shape (...) each."""
+    c = Configuration(design, *moves.poses(number, share))
+    twist, bend = moves.slopes(number, c.rotation)
+    rates = joint_rates(design, c.position, c.rotation, twist)
+    bends = joint_accelerations(design, c.position, c.rotation, twist, bend)
+    limits = design.actuators
+    speed, acceleration = (
+        np.full(6, np.inf) if six is None else np.array(six) / design.unit_mm
+        for six in (limits.speed_mm_s, limits.acceleration_mm_s2)
+    )
+    a, b = [rates], [bends]
+    up = down = [np.broadcast_to(acceleration, rates.shape)]
+    if bodies is not None:
+        push, pull = limits.limits
+        rest = np.zeros(6)
+        held, uneven, even = (
+            forces_of(c, carry_motion(c, *motion, bodies).wrench)
+            for motion in ((rest, rest), (rest, twist), (twist, bend))
+        )
+        _check_held(held, push, pull)
+        a, b = [rates, uneven - held], [bends, even - held]
+        up, down = [*up, push - held], [*down, pull + held]
+    squares = np.divide(speed, np.abs(rates), out=np.full(rates.shape, np.inf), where=rates != 0.0)
+    a, b = (np.concatenate(each, axis=-1) for each in (a, b))
+    return Bounds(
+        np.concatenate([a, -a], axis=-1),
+        np.concatenate([b, -b], axis=-1),
+        np.concatenate([*up, *down], axis=-1),
+        squares.min(axis=-1) ** 2,
+    )
+
+
+def _check_held(held: FloatArray, push: FloatArray, pull: FloatArray) -> None:
+    """Check that the actuators hold the weights at rest, with forces (..., 6) in newtons."""
+    if not np.isfinite(held).all():
+        raise NoAnswerError("the path is singular, so that no forces move the platform along it")
+    share = np.maximum(held / push, -held / pull)
+    if share.max() >= 1.0:
+        place = np.unravel_index(share.argmax(), share.shape)
+        raise NoAnswerError(
+            f"no motion along the path keeps the limits: at rest the actuator of "
+            f"{JOINTS[int(place[-1])]} bears {abs(held[place]):.4g} N of at most "
+            f"{abs(held[place]) / share[place]:.4g} N"
+        )
+
+
+def _greatest_squares(bounds: Bounds) -> FloatArray:
+    """Return the greatest squared rates at evenly spaced shares of a move, shape (n,).
+
+    They start and end at zero.
+    """
+    count = len(bounds.square)
+    double = 2.0 / (count - 1)
+    # At both ends of each interval, of which x at the end is x + double u.
+    a = np.concatenate([bounds.a[:-1], bounds.a[1:] + double * bounds.b[1:]], axis=1)
+    b = np.concatenate([bounds.b[:-1], bounds.b[1:]], axis=1)
+    most = np.concatenate([bounds.most[:-1], bounds.most[1:]], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        start, slope = most / a, -b / a
+    # Lines above and below u as functions of x: start + slope x. The last one below is x ≥ 0 at
+    # the end of the interval.
+    above, below = (
+        np.where(side, start, end) for side, end in ((a > 0.0, np.inf), (a < 0.0, -np.inf))
+    )
+    slope = np.where(a != 0.0, slope, 0.0)
+    below = np.append(below, np.zeros((count - 1, 1)), axis=1)
+    down = np.append(slope, np.full((count - 1, 1), -1.0 / double), axis=1)
+    room = above[:, :, None] - below[:, None]
+    closing = down[:, None] - slope[:, :, None]
+    crossing = np.divide(room, closing, out=np.full(room.shape, np.inf), where=closing > 0.0)
+    most_x = np.divide(most, b, out=np.full(b.shape, np.inf), where=(a == 0.0) & (b > 0.0))
+    greatest = np.minimum(crossing.min(axis=(1, 2)), most_x.min(axis=1))
+    greatest = np.append(np.minimum(greatest, bounds.square[:-1]), 0.0)
+    for i in reversed(range(count - 1)):
+        closing = down[i] + 1.0 / double
+        room = greatest[i + 1] / double - below[i]
+        ends = np.divide(room, closing, out=np.full_like(closing, np.inf), where=closing > 0.0)
+        greatest[i] = min(greatest[i], ends.min())
+    squares = np.zeros(count)
+    for i in range(count - 1):
+        increase = double * float((above[i] + slope[i] * squares[i]).min())
+        squares[i + 1] = min(max(squares[i] + increase, 0.0), greatest[i + 1])
+    return squares
