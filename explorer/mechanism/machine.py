@@ -67,20 +67,26 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         centre: Centre of mass in the platform frame, in design units.
         force_n: Largest force of the process, which acts at the tool point in any direction, in
             newtons.
+        inertia_kg_mm2: Moments of inertia about the centre along the platform's axes, which are
+            taken as principal axes, in kg mm²; zeros for a point mass.
 
     Raises:
-        DesignError: The mass or the force is negative, or a value is not finite.
+        DesignError: The mass, the force or a moment is negative, or a value is not finite.
     """
 
     mass_kg: float = 0.0
     centre: Triple = (0.0, 0.0, 0.0)
     force_n: float = 0.0
+    inertia_kg_mm2: Triple = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         # The weights of parts are payloads too, and those of a machine of kilometres are large.
         _set(self, "mass_kg", not_negative("payload.mass_kg", self.mass_kg, STIFFEST))
         _set(self, "centre", tuple(numbers("payload.centre", self.centre, 3)))
         _set(self, "force_n", not_negative("payload.force_n", self.force_n))
+        name = "payload.inertia_kg_mm2"
+        moments = numbers(name, self.inertia_kg_mm2, 3, STIFFEST)
+        _set(self, "inertia_kg_mm2", tuple(not_negative(name, each, STIFFEST) for each in moments))
 
     @property
     def weight_n(self) -> float:

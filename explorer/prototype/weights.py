@@ -96,7 +96,7 @@ def leg_radii(design: Design) -> tuple[float, ...]:
 def with_payload(design: Design, masses: Mapping[str, Mass]) -> Mapping[str, Mass]:
     """Return the masses of the bodies, the design's payload being part of the platform."""
     centre = 1e-3 * design.unit_mm * np.array(design.payload.centre)
-    payload = Mass(design.payload.mass_kg, centre, np.zeros((3, 3)))
+    payload = Mass(design.payload.mass_kg, centre, 1e-6 * np.diag(design.payload.inertia_kg_mm2))
     return {**masses, "platform": total_mass([masses["platform"], payload])}
 
 

@@ -91,6 +91,7 @@ def design_with(**machine: Any) -> Design:
 PLAIN: list[tuple[str, object, Callable[[Design], object]]] = [
     ("tool z", 3.25, lambda design: design.tool.position[2]),
     ("Mass (kg)", 2.5, lambda design: design.payload.mass_kg),
+    ("Inertia (kg mm²)", (9.0, 8.0, 7.0), lambda design: design.payload.inertia_kg_mm2),
     ("centre y", -1.5, lambda design: design.payload.centre[1]),
     ("Force on the tool (N)", 20.0, lambda design: design.payload.force_n),
     ("Gravity", "along −y", lambda design: design.gravity[1] == -1.0),

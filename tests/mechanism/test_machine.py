@@ -34,6 +34,7 @@ def decode(**fields: Any) -> Design:
         ({"tool": {"offset": 1}}, "offset in tool is unknown"),
         ({"payload": {"mass_kg": -1}}, "payload.mass_kg must not be negative; got -1"),
         ({"payload": {"centre": [0, 1e5, 0]}}, "payload.centre must lie within"),
+        ({"payload": {"inertia_kg_mm2": [1, -1, 1]}}, "payload.inertia_kg_mm2 must not be neg"),
         ({"payload": None}, "payload"),
         ({"gravity": [0, 0, 0]}, "gravity must not be all zeros"),
         ({"gravity": [0, 0]}, "gravity"),

@@ -31,7 +31,11 @@ def random_design(seed: int) -> Design:
         design,
         limits=limits,
         unit_mm=float(rng.choice([5.0, 10.0, 40.0])),
-        payload=Payload(rng.uniform(0.1, 3.0), tuple(rng.normal(size=3) * 2.0)),
+        payload=Payload(
+            rng.uniform(0.1, 3.0),
+            tuple(rng.normal(size=3) * 2.0),
+            inertia_kg_mm2=tuple(rng.uniform(0.5, 1.0, 3) * 1e3),
+        ),
         gravity=tuple(rng.normal(size=3)),
     )
 

@@ -37,6 +37,7 @@ FIELD_WORDS = {
     "tool.position": "The tool point",
     "payload.mass_kg": "The mass of the payload",
     "payload.centre": "The centre of the payload",
+    "payload.inertia_kg_mm2": "The inertia of the payload",
     "payload.force_n": "The force on the tool",
     "gravity": "The direction of gravity",
     "actuators.push_n": "The push of an actuator",

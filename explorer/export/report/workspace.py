@@ -172,6 +172,8 @@ def _payload(data: ReportData) -> Element:
     rows.append(("mass of the payload", _amount(payload.mass_kg, "kg"), ""))
     if payload.mass_kg:
         rows += point_rows(data, "the payload’s centre", payload.centre)
+    if any(payload.inertia_kg_mm2):
+        rows.append(("inertia about it, kg mm²", markup.vector(payload.inertia_kg_mm2), ""))
     rows.append(("force at the tool, any direction", _amount(payload.force_n, "N"), ""))
     rows.append(("gravity, along x, y, z of the base", markup.vector(data.design.gravity), ""))
     caption = "Tool and payload, from b4 in the platform’s axes"

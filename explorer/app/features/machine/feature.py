@@ -96,6 +96,14 @@ class MachinePanel:
             )
             self._weight = gui.add_html("", visible=False)
             self._add_point("centre", "the payload's centre", "design.payload.centre")
+            controls.triple(
+                "Inertia (kg mm²)",
+                "Moments of inertia about the payload's centre along the platform's axes; they "
+                "count in motions only.",
+                "design.payload.inertia_kg_mm2",
+                step=FINE,
+                small=True,
+            )
             controls.field(
                 "Force on the tool (N)",
                 "Largest force of the process, which acts at the tool point in any direction.",
