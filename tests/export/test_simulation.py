@@ -315,7 +315,7 @@ def test_model_unusable_designs_are_refused_with_advice() -> None:
     model_of(msgspec.structs.replace(OPTIMAL, unit_mm=least))
     collapsed = Pose((*OPTIMAL.a3, 0.0), (0.8, 0.0, 0.0, 0.6))
     flat = msgspec.structs.replace(OPTIMAL, payload=Payload(1.0, inertia_kg_mm2=(1e6, 0.0, 0.0)))
-    with pytest.raises(InputError, match="correct payload.inertia_kg_mm2"):
+    with pytest.raises(InputError, match=r"correct payload\.inertia_kg_mm2"):
         simulation_mjcf(flat)
     with pytest.raises(InputError, match="leg 4 has no length"):
         simulation_mjcf(msgspec.structs.replace(OPTIMAL, home=collapsed))

@@ -66,11 +66,13 @@ def forces_of_model(design: Design, model: Any, motion: Motion) -> FloatArray:
 
 
 @pytest.mark.parametrize(
-    ("index", "legs"), [*((index, True) for index in range(len(DESIGNS))), (0, False), (1, False)]
+    ("index", "of"),
+    [*((index, "bars") for index in range(len(DESIGNS))), (0, "parts"), (0, "none"), (1, "none")],
 )
-def test_inverse_dynamics_is_that_of_the_exported_model(index: int, legs: bool) -> None:
-    design = DESIGNS[index]
-    model = engine.MjModel.from_xml_string(simulation_mjcf(design))
+def test_inverse_dynamics_is_that_of_the_exported_model(index: int, of: str) -> None:
+    design, legs = DESIGNS[index], of != "none"
+    masses = make_prototype(design).masses(DENSITY) if of == "parts" else None
+    model = engine.MjModel.from_xml_string(simulation_mjcf(design, DENSITY, masses))
     model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
     # The rotors belong to the servos, not to the mechanism.
     model.dof_armature[:] = 0.0
@@ -79,7 +81,7 @@ def test_inverse_dynamics_is_that_of_the_exported_model(index: int, legs: bool) 
             body = model.body(name.replace(" ", "_"))
             body.mass[:], body.inertia[:] = 1e-12, 1e-12
     motions = random_motions(design, STATES, index, RATE)
-    found = inverse_dynamics(design, *motions, legs=legs)
+    found = inverse_dynamics(design, *motions, legs=legs, masses=masses)
     for forces, motion in zip(found, motions.each(), strict=True):
         expected = forces_of_model(design, model, motion)
         assert_allclose(forces, expected, atol=1e-6 * np.abs(expected).max())

@@ -281,8 +281,8 @@ def machine_words(design: Design, unit: Unit) -> str:
     free = [f"the {name}" for name, words in limits.items() if not words]
     has = "has" if free == ["the guide"] else "have"
     no_limit = f"{' and '.join(free)} {has} no limit" if free else ""
-    parts += [*limits.values(), "no force is limited" if len(free) == 3 else no_limit]
-    parts.append(_motion_words(design.actuators))
+    parts += [*limits.values(), _motion_words(design.actuators)]
+    parts.append("no force is limited" if len(free) == 3 else no_limit)
     line = "; ".join(filter(None, parts))
     return f"{line[:1].upper()}{line[1:]}."
 
