@@ -30,23 +30,31 @@ ObjectiveName = Literal[
     "smallest-load",
     "smallest-error",
     "smallest-deflection",
+    "largest-acceleration",
 ]
 
 OBJECTIVES: tuple[ObjectiveName, ...] = get_args(ObjectiveName)
 """Objectives: to match the demanded volume (the paper's F = |1 − V/V′|), the shortest longest leg
 for it, the largest volume, the largest worst margin over the required box, and over that box the
-smallest largest share of a limit under the design's load, the smallest worst error, and the
-smallest deflection under that load."""
+smallest largest share of a limit under the design's load, the smallest worst error, the smallest
+deflection under that load, and the largest acceleration in every direction."""
 
 OF_THE_MACHINE: tuple[ObjectiveName, ...] = (
     "smallest-load",
     "smallest-error",
     "smallest-deflection",
+    "largest-acceleration",
 )
 """Objectives that are about the machine around the mechanism."""
 
 OVER_BOX: tuple[ObjectiveName, ...] = ("largest-margin", *OF_THE_MACHINE)
 """Objectives that are the worst of several values over the required box."""
+
+
+def words_without_value(objective: ObjectiveName) -> str:
+    """Return what stands in place of the value of an objective over a singular box."""
+    return "none" if objective == "largest-acceleration" else "infinite"
+
 
 YAW = "yaw"
 REACH = "reach"
@@ -82,7 +90,10 @@ AZIMUTHS = 12
 
 MOST_TILT = 90.0
 # The demands that are positive numbers.
-POSITIVE = ("volume", "reach", "clearance", "stroke_ratio", "error", "deflection", "tilt")
+POSITIVE = (
+    *("volume", "reach", "clearance", "stroke_ratio"),
+    *("error", "deflection", "acceleration", "tilt"),
+)
 
 
 class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -108,6 +119,8 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
             design units.
         deflection: Largest displacement of the tool under the design's load over the required box,
             in design units.
+        acceleration: Least of the largest accelerations from rest in every direction over the
+            required box, in m/s².
     """
 
     volume: float | None = None
@@ -120,6 +133,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     held: bool = False
     error: float | None = None
     deflection: float | None = None
+    acceleration: float | None = None
     tilt: float | None = None
 
     def __post_init__(self) -> None:
@@ -345,13 +359,14 @@ def _check_demands(problem: Problem) -> None:
 def _check_statics(problem: Problem) -> None:
     demands, design = problem.demands, problem.start
     needs_load = demands.held or problem.objective == "smallest-load"
+    moves = demands.acceleration is not None or problem.objective == "largest-acceleration"
     needs_error = demands.error is not None or problem.objective == "smallest-error"
     bends = demands.deflection is not None or problem.objective == "smallest-deflection"
-    needs_box = needs_load or needs_error or bends or demands.tilt is not None
+    needs_box = needs_load or needs_error or bends or moves or demands.tilt is not None
     if needs_box and demands.required_box is None:
         raise InputError(
-            "loads, errors, deflections and tilts are demanded over a required box, and none is "
-            "given"
+            "loads, errors, deflections, accelerations and tilts are demanded over a required box, "
+            "and none is given"
         )
     if demands.tilt is not None and not demands.tilt < MOST_TILT:
         raise InputError(f"the tilt demanded must be below {MOST_TILT:g}°; got {demands.tilt:g}°")
@@ -359,7 +374,9 @@ def _check_statics(problem: Problem) -> None:
         raise StartError(
             "the design has no load: give its payload a mass, or a force of any direction", NO_LOAD
         )
-    if needs_load and np.isinf(part_limits(design)).all():
+    if moves and not design.payload.mass_kg:
+        raise StartError("the design has no mass to accelerate: give its payload a mass", NO_LOAD)
+    if (needs_load or moves) and np.isinf(part_limits(design)).all():
         raise StartError(
             "the design limits neither its actuators nor its struts nor its guide: give a limit "
             "of forces or moments",

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.machine import Payload
+from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
 from explorer.statics.forces import forces_of, twists_of_actuators
-from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry
+from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry, design_weights
 
 LIMITED = (
     *JOINTS,
@@ -174,6 +175,29 @@ def largest_payload(
     return np.where(regular & (smallest <= largest), largest, 0.0)
 
 
+def largest_accelerations(configuration: Configuration) -> FloatArray:
+    """Return the largest accelerations from rest by the limit of each part, (..., 10), in m/s².
+
+    The platform accelerates in every direction, without turning, so that all its points do so
+    alike. It carries the design's payload, whose weight and force of any direction act besides;
+    the legs count as weightless. To hold the payload a part needs a force −t · m (g − a), with t
+    the velocity of the payload's centre for a unit rate of an actuator, so that the directions of
+    ±t are the worst. The order is that of `part_limits`. Values are below zero where the payload
+    is not held at rest, −∞ in a singular pose, and infinite for a part without a limit.
+    """
+    design = configuration.design
+    held = reactions(configuration, np.zeros(6), design_weights(design))
+    values = np.concatenate([held.actuators, held.bending, held.guide_force], axis=-1)
+    regular = np.isfinite(values)
+    values = np.where(regular, values, 0.0)
+    highs, lows = part_limits(design)
+    spare = np.minimum(highs - values, lows + values) - held.spread[..., :10]
+    effect = _effect(configuration, regular.shape[:-1], design.payload.centre)
+    by_one = design.payload.mass_kg * effect[..., :10]
+    unloaded = np.where(regular & (spare >= 0.0), np.inf, -np.inf)
+    return np.divide(spare, by_one, out=unloaded, where=by_one > 0.0)
+
+
 def _limits(design: Design) -> FloatArray:
     """Return the limits of bending, guide force and guide moment, two each, in N and N × unit."""
     newton_metre = 1e3 / design.unit_mm
@@ -208,12 +232,16 @@ def _spread(c: Configuration, batch: tuple[int, ...]) -> FloatArray:
     """Return the effect of the payload's force of any direction, see `Reactions`."""
     if not c.design.payload.force_n:
         return np.zeros((*batch, 12))
-    # By the principle of virtual work, a force F at the tool asks F · v of an actuator whose
-    # unit rate moves the tool by v.
-    tool = c.design.tool.position
-    velocities = twists_of_actuators(c.with_tool(tool))[..., :3, :]
+    return c.design.payload.force_n * _effect(c, batch, c.design.tool.position)
+
+
+def _effect(c: Configuration, batch: tuple[int, ...], point: Triple) -> FloatArray:
+    """Return the effect of a force of 1 N of any direction at a point of the platform."""
+    # By the principle of virtual work, a force F at the point asks F · v of an actuator whose
+    # unit rate moves the point by v.
+    velocities = twists_of_actuators(c.with_tool(point))[..., :3, :]
     speeds = np.sqrt((velocities * velocities).sum(axis=-2))
-    forces = c.design.payload.force_n * np.where(np.isfinite(speeds), speeds, 0.0)
+    forces = np.where(np.isfinite(speeds), speeds, 0.0)
     bending = forces[..., GUIDE_ROWS] * c.joints[..., STRUT_ROWS]
     return _join(batch, forces, bending, forces[..., STRUT_ROWS], bending)
 

@@ -31,17 +31,21 @@ from explorer.optimise.problem import (
     ObjectiveName,
     Problem,
     Variable,
+    words_without_value,
 )
 from explorer.optimise.solver import optimise_design
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
-DEMANDS: tuple[dict[str, Any], ...] = ({"held": True}, {"error": 0.01}, {"deflection": 0.05})
+DEMANDS: tuple[dict[str, Any], ...] = (
+    *({"held": True}, {"error": 0.01}, {"deflection": 0.05}),
+    {"acceleration": 2.0},
+)
 # Places of the near face of a box, beyond a plane where they are negative.
 BESIDE = (-0.5, -1e-3, -1e-9, 0.0, 1e-9, 1e-3)
 # Orientations by yaw, pitch and roll; where the platform is level, two planes are the same.
-TURNS = ((-73.1, 0.0, 0.0), (-70.0, 12.0, -8.0), (35.0, -20.0, 25.0))
+TURNS = ((-73.1, 0.0, 0.0), (-70.0, 12.0, -8.0), (35.0, -20.0, 25.0), (-60.0, -5.0, 10.0))
 
 
 def machine(turn: Triple = TURNS[0], margin: float | None = None, source: Any = None) -> Design:
@@ -51,7 +55,7 @@ def machine(turn: Triple = TURNS[0], margin: float | None = None, source: Any = 
         start,
         home=Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), turn),
         limits=msgspec.structs.replace(start.limits, box=None, margin=margin),
-        payload=Payload(force_n=10.0),
+        payload=Payload(1.0, force_n=10.0),
         actuators=Actuators(
             push_n=same_for_all(150.0),
             error_mm=same_for_all(0.02),
@@ -176,7 +180,7 @@ def test_search_over_a_singular_box_never_converges_where_forces_or_errors_count
         assert all(each.objective is not None or each.spare < 0.0 for each in outcome.history)
         if objective in OF_THE_MACHINE:
             assert outcome.best.objective is None
-            assert "infinite" in outcome.run.message
+            assert words_without_value(objective) in outcome.run.message
 
 
 @pytest.mark.parametrize(("objective", "turn"), list(zip(OF_THE_MACHINE, TURNS, strict=True)))

@@ -37,8 +37,8 @@ class Optimise(options.JsonOptions, options.DesignOptions):
 
     objective: ObjectiveName = "match-volume"
     """Objective: F = |1 − V/V′| of the exact volume, the longest leg, the volume, or over the
-    required box the worst margin, the largest share of a limit of forces, the worst error, or the
-    largest deflection under the load."""
+    required box the worst margin, the largest share of a limit of forces, the worst error, the
+    largest deflection under the load, or the acceleration in every direction."""
 
     target_volume: Annotated[values.PositiveVolume, values.OPTIONAL] = None
     """Volume to match, or least volume; for the shortest leg by default that of the design."""
@@ -83,6 +83,10 @@ class Optimise(options.JsonOptions, options.DesignOptions):
     deflection: Annotated[values.Positive, values.OPTIONAL] = None
     """Largest displacement of the tool under payload and force over the required box, in design
     units."""
+
+    acceleration: Annotated[values.Positive, values.OPTIONAL] = None
+    """Acceleration from rest, in every direction over the required box, that the limits of forces
+    and moments allow with the payload, in m/s²."""
 
     tilt: Annotated[values.Positive, values.OPTIONAL] = None
     """Tilt in every azimuth that the required box must allow, in degrees."""
@@ -160,6 +164,7 @@ class Optimise(options.JsonOptions, options.DesignOptions):
             held=self.held,
             error=self.error,
             deflection=self.deflection,
+            acceleration=self.acceleration,
             tilt=self.tilt,
             free=self.free,
             bounds=[_as_variable(word) for word in self.bounds],

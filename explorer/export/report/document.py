@@ -25,7 +25,8 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import encode_design
 from explorer.numerics.number_text import UNITS, format_number, power_of_ten
-from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Record, curves_of
+from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Curve, Record, curves_of
+from explorer.optimise.problem import words_without_value
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
@@ -140,7 +141,8 @@ def search_section(data: ReportData) -> Iterator[Element]:
     if problem.demands.volume is not None:
         rows.append(("demanded volume, units³", problem.demands.volume))
     if best is not None:
-        value = "infinite" if best.objective is None else best.objective
+        missing = words_without_value(problem.objective)
+        value = missing if best.objective is None else best.objective
         rows.append((OBJECTIVE_SYMBOLS[problem.objective], value))
         rows.append(("volume, units³", best.volume))
     rows += [
@@ -188,7 +190,9 @@ def _title(record: Record, curve: Curve) -> str:
         return "Worst demand; missed below 0"
     if curve.powers:
         return "F = |1 − V / V′|"
-    return f"{OBJECTIVE_SYMBOLS[record.problem.objective].capitalize()} (units)"
+    objective = record.problem.objective
+    unit = CATALOGUE[GOALS[objective]].unit_in(UNITS).name
+    return f"{OBJECTIVE_SYMBOLS[objective].capitalize()}{f' ({unit})' if unit else ''}"
 
 
 def _chart(curve: Curve, left: float, width: float) -> Iterator[Element]:

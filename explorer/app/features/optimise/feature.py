@@ -49,6 +49,7 @@ OBJECTIVES: dict[str, ObjectiveName] = {
     "smallest load over a box": "smallest-load",
     "smallest error over a box": "smallest-error",
     "smallest deflection over a box": "smallest-deflection",
+    "largest acceleration over a box": "largest-acceleration",
 }
 FREE = {
     **{name: f"Let {name} change." for name in VARIABLES},
@@ -150,6 +151,16 @@ class OptimisePanel:
             "The largest displacement of the tool under the payload's weight and force allowed in "
             "the required box; 0 for no demand.",
             visible=lambda state: is_elastic(state.design) or _request(state).deflection > 0,
+        )
+        self._add_number(
+            "acceleration",
+            "acceleration",
+            "The acceleration from rest, in every direction, that the limits of forces and moments "
+            "must allow with the payload in the required box, in m/s²; 0 for no demand.",
+            step=0.1,
+            visible=lambda state: bool(
+                state.design.payload.mass_kg or _request(state).acceleration
+            ),
         )
         self._add_number(
             "tilt",
