@@ -170,7 +170,7 @@ def test_limits_of_motion_start_with_typical_values_and_are_told(hand: Hand) -> 
         acceleration_mm_s2=(*six(2000.0)[:5], 500.0),
     )
     assert design.actuators == limits
-    words = machine_words(design)
+    words = machine_words(design, UNITS)
     assert "continuous forces up to 100 N; speeds up to 200 mm/s; accelerations up to 500–" in words
 
 

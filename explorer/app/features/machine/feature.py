@@ -102,7 +102,6 @@ class MachinePanel:
                 "count in motions only.",
                 "design.payload.inertia_kg_mm2",
                 step=FINE,
-                small=True,
             )
             controls.field(
                 "Force on the tool (N)",
