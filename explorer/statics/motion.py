@@ -31,7 +31,7 @@ from explorer.statics.forces import A3X, A3Y
 from explorer.statics.weights import ON_GUIDE, Carried
 
 FASTEST = 1e20
-"""Largest entry of a twist and of an acceleration, of which forces are numbers still."""
+"""Largest entry of a twist or an acceleration, far below what makes forces overflow."""
 
 # Columns of the rows of the legs, see `MovingBodies`.
 TOTAL, ROD, ROD_CENTRE, MOMENT, SIDE_X, SIDE_Y, SPIN, CROSS, AXIS_X, AXIS_Y, AXIS_Z = range(11)
