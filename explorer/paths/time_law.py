@@ -8,11 +8,9 @@ acceleration, another in the shortest time that the limits of the actuators allo
 With x the squared rate and u the change of the rate, speeds bound x, and accelerations and forces
 bound sums a u + b x. These bounds hold at both ends of every interval between grid points, in which
 x changes by 2 u times its length. What holds the path at rest is assumed to be within the limits,
-so that x may be anything from zero to a greatest value. Backwards from the end of a move, that
-value is the greatest from which the next one can be kept; forwards the rate then increases as much
-as it may (the reachability analysis of Pham and Pham, "A New Approach to Time-Optimal Path
-Parameterization Based on Reachability Analysis", 2018). Last, the law is slowed down by the little
-by which a grid ten times finer shows it to exceed a limit.
+so that x may be anything from zero to a greatest value, which toppra finds (Pham and Pham, "A New
+Approach to Time-Optimal Path Parameterization Based on Reachability Analysis", 2018). Last, the law
+is slowed down by the little by which a grid ten times finer shows it to exceed a limit.
 """
 
 from __future__ import annotations
@@ -20,12 +18,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError, NoAnswerError
+from explorer.files.extras import load_extra
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
@@ -42,6 +42,8 @@ from explorer.statics.motion import (
 DEFAULT_POINTS = 200
 # Least intervals of a move, and parts of an interval in which limits are checked.
 LEAST_INTERVALS, PARTS = 16, 10
+# A squared rate that no path reaches, in the unit in which they are about one.
+UNBOUNDED = 1e8
 
 
 @dataclass(frozen=True)
@@ -149,6 +151,8 @@ def law_of_shortest_time(
 ) -> TimeLaw:
     """Return the law of the shortest time within speeds, accelerations and forces of the actuators.
 
+    Needs the extra `timing`.
+
     Args:
         design: The manipulator, whose actuators have the limits.
         poses: Corners of the path, two or more.
@@ -159,6 +163,7 @@ def law_of_shortest_time(
 
     Raises:
         InputError: There are too few poses, or no limit bounds the acceleration.
+        MissingExtraError: toppra is not installed.
         NoAnswerError: A weight exceeds the largest force of an actuator at rest, or the path is
             singular.
     """
@@ -256,36 +261,35 @@ def _greatest_squares(bounds: Bounds) -> FloatArray:
     """Return the greatest squared rates at evenly spaced shares of a move, shape (n,).
 
     They start and end at zero.
+
+    Raises:
+        MissingExtraError: toppra is not installed.
+        NoAnswerError: toppra finds no law.
     """
-    count = len(bounds.square)
-    double = 2.0 / (count - 1)
-    # At both ends of each interval, of which x at the end is x + double u.
-    a = np.concatenate([bounds.a[:-1], bounds.a[1:] + double * bounds.b[1:]], axis=1)
-    b = np.concatenate([bounds.b[:-1], bounds.b[1:]], axis=1)
-    most = np.concatenate([bounds.most[:-1], bounds.most[1:]], axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        start, slope = most / a, -b / a
-    # Lines above and below u as functions of x: start + slope x. The last one below is x ≥ 0 at
-    # the end of the interval.
-    above, below = (
-        np.where(side, start, end) for side, end in ((a > 0.0, np.inf), (a < 0.0, -np.inf))
+    algorithm, constraint = load_extra("timing", "toppra.algorithm", "toppra.constraint")
+    shares = np.linspace(0.0, 1.0, len(bounds.square), dtype=np.float64)
+    is_bounded = np.isfinite(bounds.most).all(axis=0)
+    a, b, most = (each[:, is_bounded] for each in (bounds.a, bounds.b, bounds.most))
+    # The tolerances of toppra are absolute, so it gets squared rates of about one.
+    start = np.divide(most, np.abs(a), out=np.full(a.shape, np.inf), where=a != 0.0).min(axis=1)
+    unit = float(np.median(np.minimum(start, bounds.square)))
+    rows, ones = (unit * a / most, unit * b / most, np.zeros(a.shape)), np.ones(a.shape[1])
+    square = np.minimum(bounds.square / unit, UNBOUNDED)
+    span = np.stack([np.zeros(len(shares)), square], axis=1)
+    # Each bound holds at both ends of every interval.
+    at_both_ends = constraint.canlinear_colloc_to_interpolate(
+        *rows, np.diag(ones), ones, None, None, shares, identical=True
     )
-    slope = np.where(a != 0.0, slope, 0.0)
-    below = np.append(below, np.zeros((count - 1, 1)), axis=1)
-    down = np.append(slope, np.full((count - 1, 1), -1.0 / double), axis=1)
-    room = above[:, :, None] - below[:, None]
-    closing = down[:, None] - slope[:, :, None]
-    crossing = np.divide(room, closing, out=np.full(room.shape, np.inf), where=closing > 0.0)
-    most_x = np.divide(most, b, out=np.full(b.shape, np.inf), where=(a == 0.0) & (b > 0.0))
-    greatest = np.minimum(crossing.min(axis=(1, 2)), most_x.min(axis=1))
-    greatest = np.append(np.minimum(greatest, bounds.square[:-1]), 0.0)
-    for i in reversed(range(count - 1)):
-        closing = down[i] + 1.0 / double
-        room = greatest[i + 1] / double - below[i]
-        ends = np.divide(room, closing, out=np.full_like(closing, np.inf), where=closing > 0.0)
-        greatest[i] = min(greatest[i], ends.min())
-    squares = np.zeros(count)
-    for i in range(count - 1):
-        increase = double * float((above[i] + slope[i] * squares[i]).min())
-        squares[i + 1] = min(max(squares[i] + increase, 0.0), greatest[i + 1])
-    return squares
+
+    def numbers_of(*_: object) -> tuple[object, ...]:
+        return (*at_both_ends[:5], None, span)
+
+    limits = constraint.LinearConstraint()
+    limits.identical, limits.compute_constraint_params = True, numbers_of
+    path = SimpleNamespace(path_interval=(0.0, 1.0))
+    search = algorithm.TOPPRA([limits], path, gridpoints=shares, solver_wrapper="seidel")
+    search.compute_parameterization(0.0, 0.0)
+    rates = search.problem_data.sd_vec
+    if rates is None or not np.isfinite(rates).all():
+        raise NoAnswerError("toppra finds no law of the shortest time along the path")
+    return unit * rates**2
