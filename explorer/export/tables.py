@@ -9,6 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from explorer.mechanism.design import JOINTS
+from explorer.paths.drives import Drives
 from explorer.paths.trajectory import Trajectory
 from explorer.statics.accuracy import IS_TILT, SOURCES
 from explorer.statics.budget import PARTS, SourceCosts
@@ -26,6 +27,30 @@ def trajectory_csv(trajectory: Trajectory) -> str:
     if trajectory.tool_position is not None:
         columns.append(trajectory.tool_position)
         head += length_heads([f"tool_{axis}" for axis in "xyz"], trajectory.unit_mm)
+    return _csv(head, np.column_stack(columns).tolist())
+
+
+def drives_csv(drives: Drives, trajectory: Trajectory) -> str:
+    """Return what a path asks of the actuators as CSV: a header, then a line per sample.
+
+    The trajectory of the same path and time law gives the samples. Times are in s, lengths in mm,
+    speeds in mm/s, forces in N and powers in W, as the header says.
+    """
+    mm = trajectory.unit_mm
+    head, columns = ["time_s"], [trajectory.time, mm * trajectory.joints]
+    head += [f"{joint} [mm]" for joint in JOINTS]
+    for name, unit, values in (
+        ("speed", "mm/s", drives.speed),
+        ("force", "N", drives.force),
+        ("power", "W", drives.power),
+    ):
+        head += [f"{joint} {name} [{unit}]" for joint in JOINTS]
+        columns += [np.interp(trajectory.time, drives.time, each) for each in values.T]
+    head += [*(f"{axis} [mm]" for axis in "xyz"), "qw", "qx", "qy", "qz"]
+    columns += [mm * trajectory.position, trajectory.quaternion]
+    if trajectory.tool_position is not None:
+        head += [f"tool_{axis} [mm]" for axis in "xyz"]
+        columns.append(mm * trajectory.tool_position)
     return _csv(head, np.column_stack(columns).tolist())
 
 

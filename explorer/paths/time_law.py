@@ -3,7 +3,7 @@
 A law keeps the geometry of its path, so that it stops at every corner: the actuators would need
 infinite accelerations to pass one. It is the rate of the share of a move at grid points, between
 which the second derivative of the share is constant. One law goes at a given speed with a limited
-acceleration, another in the shortest time that the limits of the actuators allow.
+acceleration, one takes a given time, another the shortest that the limits of the actuators allow.
 
 With x the squared rate and u the change of the rate, speeds bound x, and accelerations and forces
 bound sums a u + b x. These bounds hold at both ends of every interval between grid points, in which
@@ -127,9 +127,50 @@ def law_at_speed(
     Raises:
         InputError: There are too few poses, or the speed or the acceleration is not positive.
     """
-    for name, value in (("speed", speed), ("acceleration", acceleration)):
+    _check_positive(speed=speed, acceleration=acceleration)
+    return _trapezoids(design, poses, speed, acceleration, tool, points)
+
+
+def law_of_duration(
+    design: Design,
+    poses: Sequence[Pose],
+    duration: float,
+    *,
+    tool: ArrayLike | None = None,
+    points: int = DEFAULT_POINTS,
+) -> TimeLaw:
+    """Return the law of a duration in seconds whose fastest actuator accelerates the least.
+
+    It accelerates over the first half of its travel in each move and brakes over the second one.
+    The other arguments are those of `law_at_speed`.
+
+    Raises:
+        InputError: There are too few poses, the duration is not positive, or the path has no
+            length.
+    """
+    _check_positive(duration=duration)
+    law = _trapezoids(design, poses, math.inf, 1.0, tool, points)
+    if law.duration == 0.0:
+        raise InputError("the path has no length: all its poses are the same")
+    return law.slower(duration / law.duration)
+
+
+def _check_positive(**values: float) -> None:
+    """Check that numbers, by their names, are finite and above zero."""
+    for name, value in values.items():
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"the {name} must be above zero; got {value:g}")
+
+
+def _trapezoids(
+    design: Design,
+    poses: Sequence[Pose],
+    speed: float,
+    acceleration: float,
+    tool: ArrayLike | None,
+    points: int,
+) -> TimeLaw:
+    """Return the law at a speed with an acceleration; without a largest speed if it is infinite."""
     moves, number, share = _grid(poses, tool, points)
     position, rotation = moves.poses(number, share)
     twist = moves.slopes(number, rotation)[0]
@@ -174,7 +215,8 @@ def law_of_shortest_time(
     if not ((sides.max(axis=-1) > 0.0) & (sides.min(axis=-1) < 0.0))[moving].all():
         raise InputError(
             "nothing limits the acceleration along the path: give the design a limit such as "
-            "actuators.acceleration_mm_s2, or actuators.push_n and masses to move"
+            "actuators.acceleration_mm_s2, or actuators.push_n and masses to move; or choose a "
+            "duration"
         )
     squares = np.zeros(share.shape)
     for move in np.flatnonzero(moving):

@@ -9,7 +9,6 @@ from pathlib import Path as File
 from typing import Annotated
 
 import numpy as np
-import tyro
 
 from explorer.cli import options, output, values
 from explorer.errors import InputError
@@ -30,8 +29,6 @@ from explorer.statics.reactions import LIMITED, PART_NAMES
 from explorer.workspace.slices.volume import node_step_of
 
 MOST_STEPS = 100_000
-END_OPTIONS = "with --to, --to-quaternion, --to-yaw-pitch-roll, --to-tilt-torsion or --to-folds"
-INSTEAD = values.hint("instead of --from-quaternion")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +59,7 @@ class Interference(
         here, end = evaluate(design, start), self.end(start, self.to, tool)
         if end is None:
             if self.steps is not None:
-                raise InputError(f"--steps divides a move; say where it goes {END_OPTIONS}")
+                raise InputError(f"--steps divides a move; say where it goes {options.END_OPTIONS}")
             self.write(lambda: _pose_json(here, tool), _pose_lines(here, tool))
             return
         steps = self.steps or _steps_of(design, start, end, tool)
@@ -156,34 +153,13 @@ def _move_json(move: moves.MoveClearance, start: Snapshot, end: Snapshot) -> dic
 
 
 @dataclass(frozen=True, kw_only=True)
-class Path(options.JsonOptions, options.RadiiOptions, options.EndOptions, options.PointOptions):
+class Path(options.JsonOptions, options.RadiiOptions, options.PathEndOptions):
     """Plan a path between two poses within limits, margins and clearances.
 
     Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
     pitch roll in degrees, or a position and a quaternion w x y z. With `--at tool` positions are
     those of the tool, which then goes straight in each move. Needs the extra `planning`.
     """
-
-    from_: Annotated[
-        values.PoseNumbers,
-        tyro.conf.arg(name="from", help_behavior_hint="(default: the home pose)"),
-    ] = None
-    """Start of the path; lengths are in design units."""
-
-    from_quaternion: Annotated[values.Quaternion, values.OF_HOME] = None
-    """Orientation of the platform at the start."""
-
-    from_yaw_pitch_roll: Annotated[values.YawPitchRoll, INSTEAD] = None
-    """Orientation of the platform at the start, in degrees."""
-
-    from_tilt_torsion: Annotated[values.TiltTorsion, INSTEAD] = None
-    """Azimuth, tilt and torsion of the platform at the start, in degrees."""
-
-    from_folds: Annotated[values.Folds, values.hint("instead of --from")] = None
-    """Folds of the pose at the start; r in design units, angles in degrees."""
-
-    to: Annotated[values.PoseNumbers, values.OPTIONAL] = None
-    """End of the path; lengths are in design units."""
 
     load: Annotated[values.Load, values.OPTIONAL] = None
     """Force in N and moment in N × unit at the tool, along the axes of the base, besides the
@@ -210,10 +186,9 @@ class Path(options.JsonOptions, options.RadiiOptions, options.EndOptions, option
         """Write the path."""
         design = self.with_radii(self.read_design())
         tool = self.tool(design)
-        start = options.make_pose(self, "from_", design.home_pose, self.from_, tool)
-        goal = self.end(start, self.to, tool)
+        start, goal = self.ends(design)
         if goal is None:
-            raise InputError(f"say where the path ends {END_OPTIONS}")
+            raise InputError(f"say where the path ends {options.END_OPTIONS}")
         if self.load is not None:
             options.check_has_limits(design)
         if self.out is not None:

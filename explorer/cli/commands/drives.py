@@ -1,0 +1,167 @@
+"""`explorer drives`: what a path asks of the actuators in time, and the least motor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+
+from explorer.cli import options, output, values
+from explorer.errors import InputError
+from explorer.export.pose_tables import MOST_BYTES, parse_table, read_poses
+from explorer.export.tables import drives_csv
+from explorer.files.writing import check_writable, read_at_most
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose, Quadruple, Triple
+from explorer.paths import time_law
+from explorer.paths.drives import Drives as DrivesOfPath, check_limits, drive_blocks
+from explorer.paths.trajectory import trajectory
+from explorer.prototype.assembly import make_prototype
+from explorer.prototype.dynamics import moving_bodies
+from explorer.prototype.weights import DENSITY, bar_masses
+from explorer.statics.motion import MovingBodies
+
+
+class _Corner(msgspec.Struct, frozen=True):
+    """A pose in the answer of `explorer path --json`."""
+
+    position: Triple
+    quaternion: Quadruple
+
+
+class _Answer(msgspec.Struct, frozen=True):
+    """The part of the answer of `explorer path --json` that gives its corners."""
+
+    poses: list[_Corner]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drives(options.JsonOptions, options.PathEndOptions):
+    """Compute speeds, forces and powers of the actuators along a path; the least motor.
+
+    A path rests at every corner. It takes the shortest time within the design's limits of speeds,
+    accelerations and forces, which needs the extra `timing`; or `--duration`; or it has `--speed`
+    and `--acceleration`. Forces hold and accelerate platform, payload and legs; friction and the
+    rotors of motors are left out.
+    """
+
+    path: Annotated[Path | None, values.hint("instead of --from and --to", "FILE")] = None
+    """Corners of the path: a table of poses as that of `explorer inverse --poses`, or the answer of
+    `explorer path --json` in a file that ends in .json."""
+
+    duration: Annotated[values.Positive, values.hint("default: the shortest")] = None
+    """Duration in seconds, with the least acceleration of the fastest actuator."""
+
+    speed: Annotated[values.Positive, values.hint("with --acceleration")] = None
+    """Speed of the fastest actuator, in design units per second."""
+
+    acceleration: Annotated[values.Positive, values.hint("with --speed")] = None
+    """Acceleration with which the fastest actuator reaches this speed, and stops at every corner,
+    in design units per s²."""
+
+    payload: Annotated[values.NotNegative, values.OF_DESIGN] = None
+    """Mass of the payload, in kg."""
+
+    density: Annotated[float, values.POSITIVE] = DENSITY
+    """Density of the legs and the platform in kg/m³, as bars with the legs' radii."""
+
+    parts: bool = False
+    """Whether the parts of the prototype have this density, in place of bars."""
+
+    samples: Annotated[int, values.whole_number(2, 100_000)] = 201
+    """Number of rows of the table."""
+
+    out: Annotated[Path | None, values.hint("optional", "FILE.csv")] = None
+    """File for a table: time in s, then joints and pose in mm, speeds in mm/s, forces in N and
+    powers in W."""
+
+    def run(self) -> None:
+        """Write what the path asks of the actuators."""
+        design = self.read_design()
+        payload = options.replace_given(design.payload, mass_kg=self.payload)
+        design = options.replace_given(design, payload=payload)
+        if self.out is not None:
+            check_writable(self.out)
+        poses, tool = self._poses(design), self.tool(design)
+        check_limits(design, poses, tool=tool)
+        by_parts = self.parts and make_prototype(design).masses(self.density)
+        bodies = moving_bodies(design, by_parts or bar_masses(design, self.density))
+        law = self._law(design, poses, tool, bodies)
+        found = DrivesOfPath.along(design, poses, law, bodies, tool=tool)
+        files: dict[Path, bytes] = {}
+        if self.out is not None:
+            timed = trajectory(design, poses, law=law, samples=self.samples, tool=tool)
+            files[self.out] = drives_csv(found, timed).encode()
+        written, errors = options.write_files(files)
+        out = next(iter(written), None)
+        self.write(
+            lambda: _drives_json(found) | ({} if out is None else {"file": out}),
+            _drive_lines(found, len(poses) - 1, None if out is None else (self.samples, out)),
+            errors,
+        )
+
+    def _poses(self, design: Design) -> tuple[Pose, ...]:
+        """Return the corners of the path."""
+        start, goal = self.ends(design)
+        if self.path is None:
+            if goal is None:
+                raise InputError(
+                    f"give the path with --path, or say where it ends {options.END_OPTIONS}"
+                )
+            return start, goal
+        if goal is not None or start != design.home_pose:
+            raise InputError("--path has the ends of the path; leave --from and --to out")
+        data = read_at_most(self.path, MOST_BYTES)
+        if self.path.suffix.lower() == ".json":
+            try:
+                corners = msgspec.json.decode(data, type=_Answer).poses
+            except msgspec.MsgspecError as error:
+                raise InputError(
+                    f"{self.path} is no answer of explorer path --json: {error}"
+                ) from None
+            return tuple(Pose(each.position, each.quaternion) for each in corners)
+        table = parse_table(str(self.path), data, design.unit_mm)
+        if "time" in table.columns:
+            raise InputError(
+                f"{self.path} has a column time, so it is a path in time already: give the "
+                "corners alone, such as those in the answer of explorer path --json"
+            )
+        c = read_poses(table, design, start.rotation, self.at)
+        return tuple(Pose.of(*each) for each in zip(c.positions, c.rotations, strict=True))
+
+    def _law(
+        self, design: Design, poses: Sequence[Pose], tool: Triple | None, bodies: MovingBodies
+    ) -> time_law.TimeLaw:
+        """Return the time law that the options give."""
+        if (self.speed is None) != (self.acceleration is None):
+            raise InputError("--speed and --acceleration belong together: give both")
+        if self.speed is not None and self.acceleration is not None:
+            if self.duration is not None:
+                raise InputError("give either --duration, or --speed and --acceleration")
+            return time_law.law_at_speed(design, poses, self.speed, self.acceleration, tool=tool)
+        if self.duration is not None:
+            return time_law.law_of_duration(design, poses, self.duration, tool=tool)
+        return time_law.law_of_shortest_time(design, poses, tool=tool, bodies=bodies)
+
+
+def _drives_json(found: DrivesOfPath) -> dict[str, object]:
+    names = "peak_speed peak_force rms_force peak_power mean_power duration"
+    return {
+        **output.attributes(found, names),
+        "binding": [each and each._asdict() for each in found.binding],
+        "least_motor": found.least_motor._asdict(),
+    }
+
+
+def _drive_lines(
+    found: DrivesOfPath, moves: int, written: tuple[int, Path] | None
+) -> Iterator[str]:
+    plural = "" if moves == 1 else "s"
+    yield output.heading(found.design)
+    yield f"takes {output.figure(found.duration)} s, with rest at the end of {moves} move{plural}"
+    yield from output.block_lines(drive_blocks(found))
+    if written is not None:
+        yield from ("", f"{written[0]} rows in {written[1]}")

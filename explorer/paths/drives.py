@@ -1,0 +1,274 @@
+"""Drives: what a path asks of the six actuators in time, and the least motor that holds it.
+
+Speeds, accelerations and forces are those of a time law, at the start, the middle and the end of
+each interval of its grid: between two intervals the acceleration jumps. A force is that of the
+joint, so gears, screws and the inertia of rotors are left out. Mean power is the mean of its size,
+because most drives turn the power of a brake into heat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError, NoAnswerError
+from explorer.legs.moves import StraightMoves
+from explorer.measures.blocks import block
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.machine import Six
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.paths.time_law import TimeLaw
+from explorer.statics.forces import forces_of
+from explorer.statics.motion import (
+    MovingBodies,
+    carry_motion,
+    joint_accelerations,
+    joint_rates,
+)
+from explorer.workspace.limits.valid_moves import moves_are_valid
+from explorer.workspace.limits.valid_poses import violations
+
+LimitName = Literal["speed", "acceleration", "push", "pull", "continuous force"]
+LIMITS: tuple[LimitName, ...] = ("speed", "acceleration", "push", "pull")
+"""Limits that a motion uses at a time; that of the continuous force holds for the whole motion."""
+
+# Places in an interval, and their weights in its mean by Simpson's rule. The end stays within it.
+PLACES, WEIGHTS = (0.0, 0.5, 1.0 - 1e-9), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+
+
+class Binding(NamedTuple):
+    """The limit of an actuator of which a motion uses the largest share.
+
+    Attributes:
+        limit: Its name.
+        share: Share of it that is used, above 1 beyond it.
+        time: Time of the largest share in seconds; None for the continuous force.
+    """
+
+    limit: LimitName
+    share: float
+    time: float | None
+
+
+class LeastMotor(NamedTuple):
+    """Peak and continuous force in N, speed in mm/s and power in W that the six need at least."""
+
+    peak_force: float
+    continuous_force: float
+    speed: float
+    power: float
+
+
+@dataclass(frozen=True)
+class Drives:
+    """Speeds, accelerations and forces of the six actuators along a path in time.
+
+    Attributes:
+        design: The manipulator.
+        law: Time law of the path.
+        time: Times in seconds, three for each interval of the law, shape (n,).
+        speed: Speeds of the joints in mm/s, shape (n, 6).
+        acceleration: Their accelerations in mm/s², shape (n, 6).
+        force: Forces of the actuators in N, shape (n, 6); f > 0 pushes the joint's value up.
+    """
+
+    design: Design
+    law: TimeLaw
+    time: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    force: FloatArray
+
+    @staticmethod
+    def along(
+        design: Design,
+        poses: Sequence[Pose],
+        law: TimeLaw,
+        bodies: MovingBodies,
+        *,
+        tool: ArrayLike | None = None,
+    ) -> Drives:
+        """Return what a path with a time law asks of the actuators.
+
+        Args:
+            design: The manipulator.
+            poses: Corners of the path, two or more.
+            law: Its time law.
+            bodies: Masses that the actuators move.
+            tool: Point that moves straight in the platform frame, shape (3,), in design units;
+                None for b4.
+
+        Raises:
+            InputError: The path has no length, or the platform has no mass.
+            NoAnswerError: The path is singular.
+        """
+        if not bodies.platform[3, 3] > 0.0:
+            raise InputError(
+                "the platform has no mass, so that no motion asks a force for it: give it a "
+                "density, or the design a payload"
+            )
+        steps = np.diff(law.time)
+        if not law.duration > 0.0:
+            raise InputError("the path has no length: all its poses are the same")
+        moving = steps > 0.0
+        time = (law.time[:-1][moving, None] + steps[moving, None] * np.array(PLACES)).ravel()
+        at, rate, change = law.places(time)
+        # The move of an interval, by its middle: to rounding its ends may be in another one.
+        middle = 0.5 * (law.at[:-1] + law.at[1:])[moving]
+        number = np.repeat(middle.astype(np.int64), len(PLACES))
+        moves = StraightMoves.along(poses, tool)
+        c = Configuration(design, *moves.poses(number, at - number))
+        slope, bend = moves.slopes(number, c.rotation)
+        twist, rates = rate[:, None] * slope, change[:, None] * slope + rate[:, None] ** 2 * bend
+        force = forces_of(c, carry_motion(c, twist, rates, bodies).wrench)
+        if not np.isfinite(force).all():
+            raise NoAnswerError(
+                "the path is singular, so that no forces move the platform along it"
+            )
+        place = c.position, c.rotation, twist
+        speed = design.unit_mm * joint_rates(design, *place)
+        acceleration = design.unit_mm * joint_accelerations(design, *place, rates)
+        return Drives(design, law, time, speed, acceleration, force)
+
+    @property
+    def duration(self) -> float:
+        """Duration in seconds."""
+        return self.law.duration
+
+    @property
+    def power(self) -> FloatArray:
+        """Mechanical powers of the actuators in W, below zero while they brake, shape (n, 6)."""
+        return 1e-3 * self.force * self.speed
+
+    @property
+    def peak_speed(self) -> FloatArray:
+        """Largest speed of each actuator to either side in mm/s, shape (6,)."""
+        return np.abs(self.speed).max(axis=0)
+
+    @property
+    def peak_force(self) -> FloatArray:
+        """Largest force of each actuator to either side in N, shape (6,)."""
+        return np.abs(self.force).max(axis=0)
+
+    @cached_property
+    def rms_force(self) -> FloatArray:
+        """Root-mean-square force of each actuator in N, shape (6,)."""
+        return np.sqrt(self.mean(self.force**2))
+
+    @property
+    def peak_power(self) -> FloatArray:
+        """Largest power of each actuator, driving or braking, in W, shape (6,)."""
+        return np.abs(self.power).max(axis=0)
+
+    @property
+    def mean_power(self) -> FloatArray:
+        """Mean of the size of each actuator's power in W, shape (6,)."""
+        return self.mean(np.abs(self.power))
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        """Return means over time of values at the times, of shape (n, ...)."""
+        intervals = np.diff(self.law.time)
+        weights = np.outer(intervals[intervals > 0.0], WEIGHTS).ravel()
+        return weights @ values / self.duration
+
+    @cached_property
+    def binding(self) -> tuple[Binding | None, ...]:
+        """For each actuator the limit of which it uses the most; None for one without limits."""
+        limits = self.design.actuators
+        speed, acceleration, continuous = map(
+            _or_infinite, (limits.speed_mm_s, limits.acceleration_mm_s2, limits.continuous_n)
+        )
+        push, pull = limits.limits
+        shares = np.stack(
+            [
+                np.abs(self.speed) / speed,
+                np.abs(self.acceleration) / acceleration,
+                self.force / push,
+                -self.force / pull,
+            ]
+        )
+        times = self.time[shares.argmax(axis=1)]
+        most, steady = shares.max(axis=1), self.rms_force / continuous
+        found: list[Binding | None] = []
+        for joint in range(6):
+            used = [
+                *map(Binding, LIMITS, most[:, joint].tolist(), times[:, joint].tolist()),
+                Binding("continuous force", float(steady[joint]), None),
+            ]
+            largest = max(used, key=lambda each: each.share)
+            found.append(largest if largest.share > 0.0 else None)
+        return tuple(found)
+
+    @property
+    def least_motor(self) -> LeastMotor:
+        """The least that one motor for all six actuators has to hold."""
+        each = self.peak_force, self.rms_force, self.peak_speed, self.peak_power
+        return LeastMotor(*(float(six.max()) for six in each))
+
+
+def _or_infinite(six: Six | None) -> FloatArray:
+    return np.full(6, np.inf) if six is None else np.array(six)
+
+
+def check_limits(design: Design, poses: Sequence[Pose], *, tool: ArrayLike | None = None) -> None:
+    """Check that a path keeps the limits and clearances of a design.
+
+    Raises:
+        InputError: It leaves them; the message says where.
+    """
+    moves, count = StraightMoves.along(poses, tool), len(poses) - 1
+    ends = [np.array([pose.position for pose in poses]), np.array([p.rotation for p in poses])]
+    valid = moves_are_valid(
+        design, *(end[:-1] for end in ends), *(end[1:] for end in ends), tool=tool
+    )
+    for move in np.flatnonzero(~valid).tolist():
+        which = "the path" if count == 1 else f"move {move + 1} of the path"
+        share = np.linspace(0.0, 1.0, 101, dtype=np.float64)
+        c = Configuration(design, *moves.poses(np.full(len(share), move), share))
+        broken = next(((s, b) for s, b in zip(share, violations(c), strict=True) if b), None)
+        if broken is None:
+            raise InputError(f"{which} does not keep the margins or clearances of the legs")
+        raise InputError(
+            f"{which} leaves the limits at {100.0 * broken[0]:.0f} % of its way: {broken[1][0]}"
+        )
+
+
+def drive_blocks(drives: Drives) -> Iterator[block.Block]:
+    """Yield what a path asks of the actuators, and the least motor."""
+    motor, used = drives.least_motor, [*map(_binding_words, drives.binding)]
+    yield block.Statement(
+        "",
+        (
+            *("A motor that holds all this needs at least ", block.Number(motor.peak_force, " N")),
+            *(" peak, ", block.Number(motor.continuous_force, " N"), " continuous, "),
+            *(block.Number(motor.speed, " mm/s"), " and ", block.Number(motor.power, " W.")),
+        ),
+        hint="The largest of the six actuators, in each number",
+    )
+    yield block.Table(
+        f"Actuators along the path, {drives.duration:.4g} s",
+        (
+            block.Names("actuator", JOINTS),
+            block.Column("speed", drives.peak_speed.tolist(), " mm/s", 4),
+            block.Column("peak force", drives.peak_force.tolist(), " N", 4),
+            block.Column("RMS force", drives.rms_force.tolist(), " N", 4),
+            block.Column("peak power", drives.peak_power.tolist(), " W", 3),
+            block.Column("mean power", drives.mean_power.tolist(), " W", 3),
+            *((block.Names("most used limit", used),) if any(drives.binding) else ()),
+        ),
+        "Mean power is the mean of its size: a brake's power counts too.",
+    )
+
+
+def _binding_words(binding: Binding | None) -> block.Words:
+    if binding is None:
+        return "none is given"
+    at = "" if binding.time is None else f" at {binding.time:.3f} s"
+    return f"{binding.limit} ", block.Share(binding.share), at

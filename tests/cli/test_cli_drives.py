@@ -1,0 +1,85 @@
+"""What `explorer drives` answers: numbers of a path, its table, and refusals in a sentence."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from command_line import CommandLine
+from machines import same_for_all
+
+import explorer
+from explorer.mechanism.design_file import encode_design
+
+COMMAND = ("drives",)
+CORNERS = "x_mm,y_mm,z_mm\n100,50,90\n100,50,110\n140,30,110\n140,30,90\n"
+MOVE = ("--to", "12", "4", "8", "--payload", "2")
+
+
+def test_drives_of_a_table_of_corners_and_their_csv_agree(cli: CommandLine, tmp_path: Path) -> None:
+    corners, out = tmp_path / "corners.csv", tmp_path / "drives.csv"
+    corners.write_text(CORNERS, encoding="utf-8")
+    words = ["--path", corners, "--payload", "2", "--duration", "0.5"]
+    found = cli.answer(*words, "--samples", "2001", "--out", out)
+    assert found["duration"] == pytest.approx(0.5)
+    assert found["binding"] == [None] * 6
+    with out.open(encoding="utf-8", newline="") as stream:
+        rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(stream)]
+    assert len(rows) == 2001
+    for name, unit in (("speed", "mm/s"), ("force", "N"), ("power", "W")):
+        columns = [[row[f"{joint} {name} [{unit}]"] for row in rows] for joint in explorer.JOINTS]
+        peak = np.abs(columns).max(axis=1)
+        np.testing.assert_allclose(peak, found[f"peak_{name}"], rtol=0.01, atol=1e-3)
+    length = [row["l4 [mm]"] for row in rows]
+    speed = np.gradient(length, rows[1]["time_s"])
+    np.testing.assert_allclose(speed, [row["l4 speed [mm/s]"] for row in rows], atol=3.0)
+    assert "A motor that holds all this needs at least" in cli.text(*words)
+
+
+def test_drives_take_the_answer_of_path_and_the_shortest_time_of_a_design(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    limits = explorer.Actuators(
+        push_n=same_for_all(100.0),
+        speed_mm_s=same_for_all(200.0),
+        acceleration_mm_s2=same_for_all(2000.0),
+    )
+    design, answer = tmp_path / "design.json", tmp_path / "path.json"
+    preset = explorer.PRESETS["paper-optimal"]
+    design.write_bytes(encode_design(msgspec.structs.replace(preset, actuators=limits)))
+    home = preset.home_pose
+    there = {"position": [12.0, 4.0, 8.0], "quaternion": home.quaternion, "folds": []}
+    here = {"position": home.position, "quaternion": home.quaternion}
+    answer.write_text(json.dumps({"found": True, "poses": [here, there]}), encoding="utf-8")
+    by_file = cli.answer("--path", answer, "--payload", "2", "--design", design)
+    assert by_file == cli.answer(*MOVE, "--design", design)
+    assert max(each["share"] for each in by_file["binding"]) == pytest.approx(1.0, abs=1e-6)
+    assert {each["limit"] for each in by_file["binding"]} <= {"speed", "acceleration", "push"}
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ([], "--path"),
+        (MOVE, "choose a duration"),
+        ([*MOVE, "--speed", "3"], "belong together"),
+        ([*MOVE, "--speed", "3", "--acceleration", "9", "--duration", "1"], "either --duration"),
+        ([*MOVE, "--duration", "0"], "a positive number"),
+        (["--to", "12", "40", "8", "--duration", "1"], "leaves the limits"),
+        ([*MOVE, "--path", "corners.csv"], "leave --from and --to out"),
+    ],
+)
+def test_drives_refuse_what_is_no_path_in_time(
+    cli: CommandLine, words: list[str], reason: str
+) -> None:
+    assert reason in cli.refusal(*words)
+
+
+def test_drives_refuse_a_path_that_is_in_time_already(cli: CommandLine, tmp_path: Path) -> None:
+    table = tmp_path / "path.csv"
+    table.write_text("time_s,x,y,z\n0,10,5,9\n1,11,5,9\n", encoding="utf-8")
+    assert "give the corners alone" in cli.refusal("--path", table, "--duration", "1")

@@ -1,0 +1,179 @@
+"""Drives: energy, bounds, scaling by time, a motion in closed form, and limits of paths."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from machines import same_for_all, six
+from numpy.testing import assert_allclose
+from refusals import refusal
+
+from explorer import PRESETS, Actuators, Configuration, Design, NoAnswerError, Payload, Pose
+from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.numerics.arrays import triple
+from explorer.paths.drives import Drives, check_limits
+from explorer.paths.time_law import (
+    TimeLaw,
+    law_at_speed,
+    law_of_duration,
+    law_of_shortest_time,
+)
+from explorer.prototype.chains import BODIES, Chains
+from explorer.prototype.dynamics import moving_bodies
+from explorer.prototype.weights import DENSITY, bar_masses, with_payload
+from explorer.statics.motion import MovingBodies
+
+OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], payload=Payload(2.0, (1, 0, 1)))
+HOME = OPTIMAL.home_pose
+X, Y, Z = HOME.position
+WAY = 3.0
+ALONG_GUIDE = [HOME, Pose((X + WAY, Y, Z), HOME.quaternion)]
+TOOL = (0.5, 1.0, -2.0)
+
+
+def random_path(seed: int) -> list[Pose]:
+    rng = np.random.default_rng(seed)
+    turns = np.array([-73.1, 0.0, 0.0]) + rng.uniform(-15.0, 15.0, (2, 3))
+    places = np.array(HOME.position) + rng.uniform(-2.0, 2.0, (2, 3))
+    pairs = zip(places, turns, strict=True)
+    return [HOME, *(Pose.of_yaw_pitch_roll(triple(p), triple(t)) for p, t in pairs)]
+
+
+def bodies_of(design: Design) -> MovingBodies:
+    return moving_bodies(design, bar_masses(design, DENSITY))
+
+
+def drives_of(design: Design, path: list[Pose], law: TimeLaw, **options: object) -> Drives:
+    return Drives.along(design, path, law, bodies_of(design), **options)  # pyright: ignore
+
+
+def potential_energy(design: Design, pose: Pose) -> float:
+    """Return the potential energy of all bodies in a pose, in joules."""
+    places = Chains.of(design).places_at(pose.position, pose.rotation)
+    energy = 0.0
+    for name, mass in with_payload(design, bar_masses(design, DENSITY)).items():
+        body = BODIES.index(name)
+        centre = 1e-3 * design.unit_mm * places.origin[body] + places.rotation[body] @ mass.centre
+        energy -= mass.mass * STANDARD_GRAVITY * float(centre @ np.array(design.gravity))
+    return energy
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_work_of_the_actuators_from_rest_to_rest_is_the_change_of_potential_energy(
+    seed: int,
+) -> None:
+    path = random_path(seed)
+    before, after = (potential_energy(OPTIMAL, pose) for pose in (path[0], path[-1]))
+    for law in (
+        law_of_duration(OPTIMAL, path, 0.4, tool=TOOL),
+        law_at_speed(OPTIMAL, path, 20.0, 200.0, tool=TOOL),
+    ):
+        found = drives_of(OPTIMAL, path, law, tool=TOOL)
+        work = float(found.mean(found.power).sum()) * found.duration
+        size = found.duration * float(found.mean_power.sum())
+        assert work == pytest.approx(after - before, abs=1e-4 * size)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_peaks_bound_means_and_the_least_motor_bounds_all_actuators(seed: int) -> None:
+    path = random_path(seed)
+    found = drives_of(OPTIMAL, path, law_of_duration(OPTIMAL, path, 0.3))
+    assert found.duration == pytest.approx(0.3)
+    assert (found.rms_force <= found.peak_force).all()
+    assert (found.mean_power <= found.peak_power).all()
+    assert (found.peak_power <= 1e-3 * found.peak_force * found.peak_speed).all()
+    largest = found.peak_force, found.rms_force, found.peak_speed, found.peak_power
+    assert found.least_motor == tuple(each.max() for each in largest)
+
+
+def test_slower_law_has_slower_speeds_and_in_the_end_the_forces_at_rest() -> None:
+    path = random_path(1)
+    law = law_of_duration(OPTIMAL, path, 0.3)
+    found, slower = (drives_of(OPTIMAL, path, each) for each in (law, law.slower(3.0)))
+    assert_allclose(slower.speed, found.speed / 3.0, rtol=1e-6, atol=1e-9)
+    assert_allclose(slower.acceleration, found.acceleration / 9.0, rtol=1e-6, atol=1e-6)
+    still = drives_of(OPTIMAL, path, law.slower(1e5))
+    # What a motion adds to the forces at rest falls with the square of the time.
+    added, less = found.force - still.force, slower.force - still.force
+    assert_allclose(less, added / 9.0, atol=1e-6 * np.abs(added).max())
+
+
+def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
+    duration, mass = 0.5, 2.0
+    bodies = bodies_of(OPTIMAL).without_legs()
+    bodies.platform[:] = 0.0
+    bodies.platform[3, 3] = 1e-3 * OPTIMAL.unit_mm * mass
+    law = law_of_duration(OPTIMAL, ALONG_GUIDE, duration)
+    found = Drives.along(OPTIMAL, ALONG_GUIDE, law, bodies)
+    way = OPTIMAL.unit_mm * WAY
+    assert_allclose(found.peak_speed[[1, 3]], 2.0 * way / duration, rtol=1e-3)
+    assert_allclose(np.abs(found.acceleration[:, [1, 3]]), 4.0 * way / duration**2, rtol=1e-2)
+    # The weight of the point does no work, so that all power is that of its inertia.
+    power = 1e-6 * mass * found.acceleration[:, 1] * found.speed[:, 1]
+    assert_allclose(found.power.sum(axis=1), power, atol=1e-3 * np.abs(power).max())
+
+
+def limited(share: float, found: Drives) -> Design:
+    """Return a design whose actuators have shares of what a path asks, as their limits."""
+    limits = Actuators(
+        speed_mm_s=six(share * found.peak_speed),
+        acceleration_mm_s2=six(2.0 * share * np.abs(found.acceleration).max(axis=0)),
+        push_n=six(3.0 * share * found.peak_force),
+        continuous_n=six(3.0 * share * found.rms_force),
+    )
+    return msgspec.structs.replace(found.design, actuators=limits)
+
+
+def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
+    path = random_path(2)
+    law = law_of_duration(OPTIMAL, path, 0.3)
+    found = drives_of(OPTIMAL, path, law)
+    assert found.binding == (None,) * 6
+    for joint, each in enumerate(drives_of(limited(0.8, found), path, law).binding):
+        assert each is not None
+        assert (each.limit, each.share) == ("speed", pytest.approx(1.25))
+        speed = np.interp(each.time or 0.0, found.time, np.abs(found.speed[:, joint]))
+        assert speed == pytest.approx(found.peak_speed[joint])
+    steady = Actuators(continuous_n=same_for_all(float(found.rms_force.max())))
+    design = msgspec.structs.replace(OPTIMAL, actuators=steady)
+    binding = drives_of(design, path, law).binding[int(found.rms_force.argmax())]
+    assert binding == ("continuous force", pytest.approx(1.0), None)
+
+
+def test_law_of_shortest_time_uses_up_a_limit_and_exceeds_none() -> None:
+    path = random_path(3)
+    design = limited(0.7, drives_of(OPTIMAL, path, law_of_duration(OPTIMAL, path, 0.3)))
+    law = law_of_shortest_time(design, path, bodies=bodies_of(design))
+    shares = [each.share for each in drives_of(design, path, law).binding if each]
+    # That of the continuous force is none of the law's.
+    assert max(shares) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_path_without_length_or_mass_or_through_a_singular_pose_is_refused() -> None:
+    assert "no length" in refusal(lambda: law_of_duration(OPTIMAL, [HOME, HOME], 1.0))
+    still = TimeLaw(np.zeros(3), np.array([0.0, 0.5, 1.0]), np.zeros(3))
+    assert "no length" in refusal(lambda: drives_of(OPTIMAL, [HOME, HOME], still))
+    law = law_of_duration(OPTIMAL, ALONG_GUIDE, 1.0)
+    massless = bodies_of(OPTIMAL)
+    massless.platform[:] = 0.0
+    assert "no mass" in refusal(lambda: Drives.along(OPTIMAL, ALONG_GUIDE, law, massless))
+    for duration in (0.0, -1.0, math.nan):
+        assert "above zero" in refusal(law_of_duration, OPTIMAL, ALONG_GUIDE, duration)
+    through = [HOME, Pose((X, Y, 0.0), HOME.quaternion)]
+    law = law_of_duration(OPTIMAL, through, 1.0)
+    assert np.abs(Configuration(OPTIMAL, through[1].position, HOME.rotation).margins).min() == 0.0
+    with pytest.raises(NoAnswerError, match="singular"):
+        drives_of(OPTIMAL, through, law)
+
+
+def test_path_beyond_the_limits_is_refused_with_the_place_and_the_limit() -> None:
+    check_limits(OPTIMAL, ALONG_GUIDE)
+    far = Pose((X, 40.0, Z), HOME.quaternion)
+    words = refusal(lambda: check_limits(OPTIMAL, [*ALONG_GUIDE, far]))
+    assert words.startswith("move 2 of the path leaves the limits at ")
+    assert "above its maximum" in words
+    other_mode = Pose((X, Y, -Z), HOME.quaternion)
+    assert "leaves the limits" in refusal(lambda: check_limits(OPTIMAL, [HOME, other_mode]))
