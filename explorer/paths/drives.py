@@ -39,6 +39,8 @@ LimitName = Literal["speed", "acceleration", "push", "pull", "continuous force"]
 LIMITS: tuple[LimitName, ...] = ("speed", "acceleration", "push", "pull")
 """Limits that a motion uses at a time; that of the continuous force holds for the whole motion."""
 
+# Share of a limit from which it counts as exceeded, rather than used up to rounding.
+BEYOND = 1.0 + 1e-6
 # Places in an interval, and their weights in its mean by Simpson's rule. The end stays within it.
 PLACES, WEIGHTS = (0.0, 0.5, 1.0 - 1e-9), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
@@ -244,7 +246,7 @@ def drive_blocks(drives: Drives) -> Iterator[block.Block]:
     """Yield what a path asks of the actuators, and the least motor."""
     motor, used = drives.least_motor, [*map(_binding_words, drives.binding)]
     yield block.Statement(
-        "",
+        "Least motor",
         (
             *("A motor that holds all this needs at least ", block.Number(motor.peak_force, " N")),
             *(" peak, ", block.Number(motor.continuous_force, " N"), " continuous, "),
@@ -256,14 +258,15 @@ def drive_blocks(drives: Drives) -> Iterator[block.Block]:
         f"Actuators along the path, {drives.duration:.4g} s",
         (
             block.Names("actuator", JOINTS),
-            block.Column("speed", drives.peak_speed.tolist(), " mm/s", 4),
-            block.Column("peak force", drives.peak_force.tolist(), " N", 4),
-            block.Column("RMS force", drives.rms_force.tolist(), " N", 4),
-            block.Column("peak power", drives.peak_power.tolist(), " W", 3),
-            block.Column("mean power", drives.mean_power.tolist(), " W", 3),
+            block.Column("peak speed, mm/s", drives.peak_speed.tolist(), digits=4),
+            block.Column("peak force, N", drives.peak_force.tolist(), digits=4),
+            block.Column("RMS force, N", drives.rms_force.tolist(), digits=4),
+            block.Column("peak power, W", drives.peak_power.tolist(), digits=3),
+            block.Column("mean power, W", drives.mean_power.tolist(), digits=3),
             *((block.Names("most used limit", used),) if any(drives.binding) else ()),
         ),
         "Mean power is the mean of its size: a brake's power counts too.",
+        ["beyond" if each and each.share > BEYOND else None for each in drives.binding],
     )
 
 

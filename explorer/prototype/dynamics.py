@@ -1,8 +1,8 @@
-"""Inverse dynamics: the forces of the actuators in a motion, with the bodies of the prototype."""
+"""Inverse dynamics: forces of the actuators in a motion or along a path, with all bodies."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
+from explorer.paths.drives import Drives, check_limits
+from explorer.paths.time_law import law_of_duration, law_of_shortest_time
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains
 from explorer.prototype.weights import DENSITY, Mass, bar_masses, with_payload
 from explorer.statics.forces import forces_of
@@ -64,6 +67,39 @@ def inverse_dynamics(
     if not legs:
         bodies = bodies.without_legs()
     return forces_of(c, carry_motion(c, twist, acceleration, bodies).wrench)
+
+
+def drives_along(
+    design: Design,
+    poses: Sequence[Pose],
+    duration: float | None = None,
+    *,
+    tool: ArrayLike | None = None,
+    density: float = DENSITY,
+) -> Drives:
+    """Return what a path within the limits of a design asks of its actuators.
+
+    Args:
+        design: The manipulator, with its payload and its direction of gravity.
+        poses: Corners of the path, two or more, at which it rests.
+        duration: Duration in seconds; None for the shortest time within the limits of the
+            actuators, which needs the extra `timing`.
+        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+            for b4.
+        density: Density of legs and platform in kg/m³, as bars with the legs' radii.
+
+    Raises:
+        InputError: The path leaves the limits or has no length, or nothing limits its time.
+        MissingExtraError: toppra is not installed.
+        NoAnswerError: The path is singular, or a weight exceeds the largest force at rest.
+    """
+    check_limits(design, poses, tool=tool)
+    bodies = moving_bodies(design, bar_masses(design, density))
+    if duration is None:
+        law = law_of_shortest_time(design, poses, tool=tool, bodies=bodies)
+    else:
+        law = law_of_duration(design, poses, duration, tool=tool)
+    return Drives.along(design, poses, law, bodies, tool=tool)
 
 
 @lru_cache(16)

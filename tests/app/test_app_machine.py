@@ -100,7 +100,7 @@ PLAIN: list[tuple[str, object, Callable[[Design], object]]] = [
     ("Moment given directly", True, lambda design: design.struts.moment_nm),
     ("Limited guide force", True, lambda design: design.guide.force_n),
     ("Limited guide moment", True, lambda design: design.guide.moment_nm),
-    ("Error of each (mm)", 0.02, lambda design: design.actuators.error_mm[3]),
+    ("Error (mm)", 0.02, lambda design: design.actuators.error_mm[3]),
     ("Limited continuous force", True, lambda design: design.actuators.continuous_n),
     ("Limited speed", True, lambda design: design.actuators.speed_mm_s),
     ("Limited acceleration", True, lambda design: design.actuators.acceleration_mm_s2),
@@ -129,9 +129,9 @@ def test_control_changes_the_design_in_one_step_that_is_undone_and_saved(
 
 def test_limits_are_switched_on_set_and_switched_off(hand: Hand) -> None:
     hand.set("Limited forces", True)
-    hand.set("Push of each (N)", 400.0)
+    hand.set("Push (N)", 400.0)
     assert hand.set("Pull of its own", True).actuators.pull_n == six(400.0)
-    design = hand.set("Pull of each (N)", 300.0)
+    design = hand.set("Pull (N)", 300.0)
     assert design.actuators == Actuators(six(400.0), six(300.0))
     assert hand.set("Pull of its own", False).actuators == Actuators(six(400.0))
     assert hand.set("Limited forces", False).actuators == Actuators()
@@ -176,8 +176,8 @@ def test_limits_of_motion_start_with_typical_values_and_are_told(hand: Hand) -> 
 
 def test_field_of_a_limit_is_visible_only_while_the_limit_is_on(hand: Hand) -> None:
     fields = {
-        "Push of each (N)": "Limited forces",
-        "Pull of each (N)": "Pull of its own",
+        "Push (N)": "Limited forces",
+        "Pull (N)": "Pull of its own",
         "Outer diameter (mm)": "Tubes",
         "Largest stress (MPa)": "Limited stress",
         "Largest moment (N m)": "Moment given directly",
@@ -202,7 +202,7 @@ def test_field_of_all_actuators_shows_what_counts_of_single_ones_and_sets_all(ha
         ("push of d1 (N)", 250.0),
         ("push of l4 (N)", 80.0),
         ("Elastic", True),
-        ("Stiffness of each (N/mm)", 500.0),
+        ("Stiffness (N/mm)", 500.0),
         ("stiffness of l4 (N/mm)", 400.0),
         ("error of l1 (mm)", 0.03),
     ):
@@ -213,12 +213,12 @@ def test_field_of_all_actuators_shows_what_counts_of_single_ones_and_sets_all(ha
         stiffness_n_mm=(500.0, 500.0, 500.0, 500.0, 500.0, 400.0),
     )
     for label, value in (
-        ("Push of each (N)", 80.0),
-        ("Error of each (mm)", 0.03),
-        ("Stiffness of each (N/mm)", 400.0),
+        ("Push (N)", 80.0),
+        ("Error (mm)", 0.03),
+        ("Stiffness (N/mm)", 400.0),
     ):
         assert hand.controls[label].value == value
-    assert hand.set("Push of each (N)", 90.0).actuators.push_n == six(90.0)
+    assert hand.set("Push (N)", 90.0).actuators.push_n == six(90.0)
     assert hand.set("Elastic", False).actuators.stiffness_n_mm is None
 
 
@@ -236,8 +236,8 @@ def test_limit_of_the_pull_alone_is_shown_and_kept(services: Services, desk: Des
     desk.session.do(Open(design_with(actuators=Actuators(pull_n=six(90.0)))))
     hand = Hand(services, desk)
     assert hand.controls["Limited forces"].value
-    assert not hand.controls["Push of each (N)"].visible
-    assert hand.controls["Pull of each (N)"].value == 90.0
+    assert not hand.controls["Push (N)"].visible
+    assert hand.controls["Pull (N)"].value == 90.0
     assert "actuators pull up to 90 N" in machine_words(desk.state.design, UNITS)
     assert hand.set("Limited forces", False).actuators == Actuators()
 

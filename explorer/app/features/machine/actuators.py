@@ -188,7 +188,7 @@ def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
 
 
 def _add_common(controls: MachineControls, quantity: Quantity) -> None:
-    label = f"{quantity.word.capitalize()} of each ({quantity.unit})"
+    label = f"{quantity.word.capitalize()} ({quantity.unit})"
     # The number that counts for all six.
     extreme, word = (max, "largest") if quantity is ERROR else (min, "least")
     controls.field(

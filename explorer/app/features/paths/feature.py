@@ -10,6 +10,7 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab, show
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
+from explorer.app.features.paths.drives import DRIVES_FEED, drives_html
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
@@ -168,6 +169,7 @@ PATHS = Feature(
     tabs=(Tab("work", "Paths", PathsPanel, viser.Icon.ROUTE),),
     bar=(InBar("right", lambda _: path_chip),),
     scene=(PathScene,),
+    later_feeds=(DRIVES_FEED,),
     runners=(PathRunner,),
     commands=(
         StateCommand(
@@ -178,5 +180,6 @@ PATHS = Feature(
             (Key("P"),),
         ),
     ),
+    tasks=(drives_html,),
     keys={"Paths › Go": (Key("J"),)},
 )
