@@ -10,8 +10,8 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab, show
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
-from explorer.app.features.paths.drives import DRIVES_FEED, drives_html
 from explorer.app.features.paths.panel import PathsPanel
+from explorer.app.features.paths.work import DRIVES_FEED, draw_drives
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
 from explorer.app.session.worker import Worker
@@ -180,6 +180,6 @@ PATHS = Feature(
             (Key("P"),),
         ),
     ),
-    tasks=(drives_html,),
+    tasks=(draw_drives,),
     keys={"Paths › Go": (Key("J"),)},
 )
