@@ -8,7 +8,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import JOINTS
+from explorer.mechanism.pose import Pose, Triple
 from explorer.paths.drives import Drives
 from explorer.paths.trajectory import Trajectory
 from explorer.statics.accuracy import IS_TILT, SOURCES
@@ -52,6 +54,14 @@ def drives_csv(drives: Drives, trajectory: Trajectory) -> str:
         head += [f"tool_{axis} [mm]" for axis in "xyz"]
         columns.append(mm * trajectory.tool_position)
     return _csv(head, np.column_stack(columns).tolist())
+
+
+def corners_csv(poses: Iterable[Pose], tool: Triple | None = None) -> str:
+    """Return corners of a path as CSV, in design units: positions of the tool, or of b4 if None."""
+    name = "" if tool is None else "tool_"
+    head = [*(f"{name}{axis}" for axis in "xyz"), "qw", "qx", "qy", "qz"]
+    places = ((p.position if tool is None else tool_position(p, tool), p) for p in poses)
+    return _csv(head, ((*position, *pose.quaternion) for position, pose in places))
 
 
 TOLERANCE_COLUMNS = (

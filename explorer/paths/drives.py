@@ -274,4 +274,5 @@ def _binding_words(binding: Binding | None) -> block.Words:
     if binding is None:
         return "none is given"
     at = "" if binding.time is None else f" at {binding.time:.3f} s"
-    return f"{binding.limit} ", block.Share(binding.share), at
+    share = binding.share if binding.share > BEYOND else min(binding.share, 1.0)
+    return f"{binding.limit} ", block.Share(share), at

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.drives import Drives, check_limits
-from explorer.paths.time_law import law_of_duration, law_of_shortest_time
+from explorer.paths.time_law import TimeLaw, law_of_duration, law_of_shortest_time
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains
 from explorer.prototype.weights import DENSITY, Mass, bar_masses, with_payload
 from explorer.statics.forces import forces_of
@@ -69,36 +70,39 @@ def inverse_dynamics(
     return forces_of(c, carry_motion(c, twist, acceleration, bodies).wrench)
 
 
-def drives_along(
-    design: Design,
-    poses: Sequence[Pose],
-    duration: float | None = None,
-    *,
-    tool: ArrayLike | None = None,
-    density: float = DENSITY,
-) -> Drives:
-    """Return what a path within the limits of a design asks of its actuators.
+class TimedPath(NamedTuple):
+    """A path of straight moves with rest at every corner, and what moves along it.
 
-    Args:
-        design: The manipulator, with its payload and its direction of gravity.
-        poses: Corners of the path, two or more, at which it rests.
-        duration: Duration in seconds; None for the shortest time within the limits of the
-            actuators, which needs the extra `timing`.
-        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
-            for b4.
+    Attributes:
+        poses: Corners of the path, two or more.
+        law: Its time law, or its duration in seconds with the least acceleration of the fastest
+            actuator; None for the shortest time within the limits of the actuators, which needs
+            the extra `timing`.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
         density: Density of legs and platform in kg/m³, as bars with the legs' radii.
+    """
+
+    poses: Sequence[Pose]
+    law: TimeLaw | float | None = None
+    tool: Triple | None = None
+    density: float = DENSITY
+
+
+def drives_along(design: Design, path: TimedPath) -> Drives:
+    """Return what a path within the limits of a design asks of its actuators.
 
     Raises:
         InputError: The path leaves the limits or has no length, or nothing limits its time.
         MissingExtraError: toppra is not installed.
         NoAnswerError: The path is singular, or a weight exceeds the largest force at rest.
     """
+    poses, law, tool, density = path
     check_limits(design, poses, tool=tool)
     bodies = moving_bodies(design, bar_masses(design, density))
-    if duration is None:
+    if law is None:
         law = law_of_shortest_time(design, poses, tool=tool, bodies=bodies)
-    else:
-        law = law_of_duration(design, poses, duration, tool=tool)
+    elif not isinstance(law, TimeLaw):
+        law = law_of_duration(design, poses, law, tool=tool)
     return Drives.along(design, poses, law, bodies, tool=tool)
 
 

@@ -29,6 +29,7 @@ from explorer.app.features.paths.actions import (
     ends_of,
     goal_of,
 )
+from explorer.app.features.paths.drives import drives_html
 from explorer.app.features.paths.feature import DIED, PathRunner, PathScene
 from explorer.app.features.paths.panel import (
     CANCEL,
@@ -49,6 +50,7 @@ from explorer.app.features.paths.plots import (
     incidence_columns,
     margins_in,
 )
+from explorer.app.features.paths.work import DrivesRequest, draw_drives, request_for
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Action, Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
@@ -531,3 +533,36 @@ def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     pose = journey.pose_at(found.seconds)
     here = path_loads(PRESS, (pose, pose), state.load)
     assert (here.share, here.part) == (pytest.approx(expected.share), expected.part)
+
+
+# Speeds and forces along the path
+
+
+def drives_request(state: State) -> DrivesRequest:
+    request = request_for(state)
+    assert request is not None
+    return request
+
+
+def test_drives_of_the_path_are_requested_once_it_is_there_and_wanted() -> None:
+    state = with_ends(open_state(OPTIMAL), None, GOAL)
+    wanted = Set("paths.drives", "duration").apply(state)
+    assert request_for(wanted) is None
+    assert request_for(Go().apply(state)) is None
+    design, path = drives_request(Go().apply(wanted))
+    assert design == OPTIMAL
+    assert path.poses == journey_of(Go().apply(state)).poses
+    assert path.law == 1.0
+    assert drives_request(Set("paths.drives", "shortest").apply(Go().apply(wanted)))[1].law is None
+    with pytest.raises(InputError, match="a path needs a time above zero"):
+        Set("paths.duration", 0.0).apply(wanted)
+
+
+def test_drives_are_drawn_or_the_reason_is_told_in_a_sentence() -> None:
+    wanted = Set("paths.drives", "duration").apply(with_ends(open_state(OPTIMAL), None, GOAL))
+    html = drives_html(draw_drives(drives_request(Go().apply(wanted))))
+    assert "A motor that holds all this needs at least" in html
+    # A line of each actuator in the three charts over time and in that of force and speed.
+    assert html.count('<path d="M') == 24
+    between = Set("paths.drives", "duration").apply(start_between(0, 3))
+    assert "leaves the limits" in drives_html(draw_drives(drives_request(between)))

@@ -16,13 +16,11 @@ from explorer.export.tables import drives_csv
 from explorer.files.writing import check_writable, read_at_most
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Quadruple, Triple
-from explorer.paths import time_law
-from explorer.paths.drives import Drives as DrivesOfPath, check_limits, drive_blocks
+from explorer.paths.drives import Drives as DrivesOfPath, drive_blocks
+from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.paths.trajectory import trajectory
-from explorer.prototype.assembly import make_prototype
-from explorer.prototype.dynamics import moving_bodies
-from explorer.prototype.weights import DENSITY, bar_masses
-from explorer.statics.motion import MovingBodies
+from explorer.prototype.dynamics import TimedPath, drives_along
+from explorer.prototype.weights import DENSITY
 
 
 class _Corner(msgspec.Struct, frozen=True):
@@ -68,9 +66,6 @@ class Drives(options.JsonOptions, options.PathEndOptions):
     density: Annotated[float, values.POSITIVE] = DENSITY
     """Density of the legs and the platform in kg/m³, as bars with the legs' radii."""
 
-    parts: bool = False
-    """Whether the parts of the prototype have this density, in place of bars."""
-
     samples: Annotated[int, values.whole_number(2, 100_000)] = 201
     """Number of rows of the table."""
 
@@ -86,20 +81,17 @@ class Drives(options.JsonOptions, options.PathEndOptions):
         if self.out is not None:
             check_writable(self.out)
         poses, tool = self._poses(design), self.tool(design)
-        check_limits(design, poses, tool=tool)
-        by_parts = self.parts and make_prototype(design).masses(self.density)
-        bodies = moving_bodies(design, by_parts or bar_masses(design, self.density))
-        law = self._law(design, poses, tool, bodies)
-        found = DrivesOfPath.along(design, poses, law, bodies, tool=tool)
+        path = TimedPath(poses, self._law(design, poses, tool), tool, self.density)
+        found = drives_along(design, path)
         files: dict[Path, bytes] = {}
         if self.out is not None:
-            timed = trajectory(design, poses, law=law, samples=self.samples, tool=tool)
+            timed = trajectory(design, poses, law=found.law, samples=self.samples, tool=tool)
             files[self.out] = drives_csv(found, timed).encode()
         written, errors = options.write_files(files)
         out = next(iter(written), None)
         self.write(
             lambda: _drives_json(found) | ({} if out is None else {"file": out}),
-            _drive_lines(found, len(poses) - 1, None if out is None else (self.samples, out)),
+            _drive_lines(found, None if out is None else (self.samples, out)),
             errors,
         )
 
@@ -133,18 +125,16 @@ class Drives(options.JsonOptions, options.PathEndOptions):
         return tuple(Pose.of(*each) for each in zip(c.positions, c.rotations, strict=True))
 
     def _law(
-        self, design: Design, poses: Sequence[Pose], tool: Triple | None, bodies: MovingBodies
-    ) -> time_law.TimeLaw:
-        """Return the time law that the options give."""
+        self, design: Design, poses: Sequence[Pose], tool: Triple | None
+    ) -> TimeLaw | float | None:
+        """Return the time law that the options give, as `TimedPath` takes it."""
         if (self.speed is None) != (self.acceleration is None):
             raise InputError("--speed and --acceleration belong together: give both")
-        if self.speed is not None and self.acceleration is not None:
-            if self.duration is not None:
-                raise InputError("give either --duration, or --speed and --acceleration")
-            return time_law.law_at_speed(design, poses, self.speed, self.acceleration, tool=tool)
+        if self.speed is None or self.acceleration is None:
+            return self.duration
         if self.duration is not None:
-            return time_law.law_of_duration(design, poses, self.duration, tool=tool)
-        return time_law.law_of_shortest_time(design, poses, tool=tool, bodies=bodies)
+            raise InputError("give either --duration, or --speed and --acceleration")
+        return law_at_speed(design, poses, self.speed, self.acceleration, tool=tool)
 
 
 def _drives_json(found: DrivesOfPath) -> dict[str, object]:
@@ -156,12 +146,8 @@ def _drives_json(found: DrivesOfPath) -> dict[str, object]:
     }
 
 
-def _drive_lines(
-    found: DrivesOfPath, moves: int, written: tuple[int, Path] | None
-) -> Iterator[str]:
-    plural = "" if moves == 1 else "s"
+def _drive_lines(found: DrivesOfPath, written: tuple[int, Path] | None) -> Iterator[str]:
     yield output.heading(found.design)
-    yield f"takes {output.figure(found.duration)} s, with rest at the end of {moves} move{plural}"
     yield from output.block_lines(drive_blocks(found))
     if written is not None:
         yield from ("", f"{written[0]} rows in {written[1]}")

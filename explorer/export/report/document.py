@@ -295,6 +295,7 @@ _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
     mechanism.singularity_section,
     mechanism.legs_section,
     workspace.loads_section,
+    workspace.path_section,
     workspace.precision_section,
     mechanism.parts_section,
     search_section,

@@ -11,7 +11,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import extra_button
-from explorer.app.widgets.markup import alert, dim, sentence
+from explorer.app.widgets.markup import alert, sentence
 from explorer.errors import ExplorerError
 from explorer.files.extras import is_missing
 
@@ -44,10 +44,8 @@ class DrivesPanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         paths = frame.state.paths
-        if paths.drives == "off":
+        if paths.drives == "off" or frame.state.journey is None:
             html = ""
-        elif frame.state.journey is None:
-            html = dim("No path yet.")
         elif paths.drives == "shortest" and self._missing:
             html = self._missing
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
@@ -13,19 +13,11 @@ from explorer.export.drawings.drives import force_speed_chart, time_charts
 from explorer.export.drawings.markup import as_html
 from explorer.measures.blocks.block import Block
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose, Triple
 from explorer.paths.drives import drive_blocks
-from explorer.prototype.dynamics import drives_along
+from explorer.prototype.dynamics import TimedPath, drives_along
 
-
-class DrivesRequest(NamedTuple):
-    """A path, its duration in seconds, None for the shortest, and the density of the bars."""
-
-    design: Design
-    poses: tuple[Pose, ...]
-    tool: Triple | None
-    duration: float | None
-    density: float
+DrivesRequest: TypeAlias = tuple[Design, TimedPath]
+"""A path of a design."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,20 +29,19 @@ class DrivesDrawing:
 
 
 def request_for(state: State) -> DrivesRequest | None:
-    """Return what is asked of the path of a state; None if nothing is, or without a path."""
+    """Return the path of a state if speeds and forces along it are wanted, else None."""
     journey, paths = state.journey, state.paths
     if journey is None or paths.drives == "off":
         return None
     duration = paths.duration if paths.drives == "duration" else None
     density = state.view.prototype.density
-    return DrivesRequest(journey.design, journey.poses, journey.tool, duration, density)
+    return journey.design, TimedPath(journey.poses, duration, journey.tool, density)
 
 
 def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:
     """Return what a path asks of the actuators with its charts, or why there is no answer."""
-    design, poses, tool, duration, density = request
     try:
-        found = drives_along(design, poses, duration, tool=tool, density=density)
+        found = drives_along(*request)
     except ExplorerError as error:
         return error
     charts = "".join(as_html(chart) for chart in (time_charts(found), force_speed_chart(found)))
