@@ -135,22 +135,6 @@ def test_law_of_shortest_time_takes_longer_by_as_much_as_its_limits_are_slower(
     assert longer.duration == pytest.approx(slower * law.duration, rel=1e-6)
 
 
-def test_law_of_shortest_time_with_forces_that_hardly_hold_the_weight_exceeds_none() -> None:
-    design, path = random_case(2)
-    bodies = moving_bodies(design, bar_masses(design, DENSITY))
-    moves = StraightMoves.along(path, TOOL)
-    poses = moves.poses(np.array([0, 1]).repeat(201), np.tile(np.linspace(0.0, 1.0, 201), 2))
-    held = inverse_dynamics(
-        design, *poses, np.zeros(6), np.zeros(6), masses=bar_masses(design, DENSITY)
-    )
-    push = six(1.0001 * np.abs(held).max(axis=0))
-    limits = msgspec.structs.replace(design.actuators, push_n=push)
-    hardly = msgspec.structs.replace(design, actuators=limits)
-    law = law_of_shortest_time(hardly, path, tool=TOOL, bodies=bodies)
-    assert shares_of_limits(hardly, path, law).max() <= 1.0 + 1e-9
-    assert law.duration > 5.0
-
-
 def test_laws_rest_at_every_corner_and_lie_on_the_path() -> None:
     design, path = random_case(9)
     path.insert(1, path[1])

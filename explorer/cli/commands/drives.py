@@ -33,7 +33,7 @@ class _Corner(msgspec.Struct, frozen=True):
 class _Answer(msgspec.Struct, frozen=True):
     """The part of the answer of `explorer path --json` that gives its corners."""
 
-    poses: list[_Corner]
+    poses: Annotated[list[_Corner], msgspec.Meta(min_length=2)]
 
 
 @dataclass(frozen=True, kw_only=True)
