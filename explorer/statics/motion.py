@@ -112,8 +112,8 @@ def joint_accelerations(
     velocity, out = velocity[..., LENGTH_ROWS, :], out[..., LENGTH_ROWS, :]
     velocity = np.where(ON_GUIDE[:, None], velocity * ACROSS, velocity)
     across = velocity - dot(c.leg_directions, velocity)[..., None] * c.leg_directions
-    bend, lengths = dot(across, across), c.leg_lengths
-    centripetal = np.divide(bend, lengths, out=np.zeros(bend.shape), where=lengths > 0.0)
+    squares, lengths = dot(across, across), c.leg_lengths
+    centripetal = np.divide(squares, lengths, out=np.zeros(squares.shape), where=lengths > 0.0)
     result[..., LENGTH_ROWS] = dot(c.leg_directions, out) + centripetal
     return result
 
@@ -139,7 +139,7 @@ def leg_inertia(
 
     Returns:
         The force at its end that stands for them, their sum, and the moment by which they change
-        that of the force of its carriage.
+        that of the force of its carriage, in N and N × unit.
     """
     slide, first = 0.0, (m[AXIS_X], m[AXIS_Y], m[AXIS_Z])
     if on_guide:
@@ -152,13 +152,13 @@ def leg_inertia(
     s = along((0.0, 0.0, 0.0), 1.0 / length, leg)
     # The leg's frame (x, y, s): y is the second axis of the universal joint. Along the first axis
     # that is undefined, and the spin is taken as zero.
-    y, lean = cross3(s, first), dot3(s, first)
-    upright = norm3(y)
-    if upright > 0.0:
-        y = along((0.0, 0.0, 0.0), 1.0 / upright, y)
+    y, cosine = cross3(s, first), dot3(s, first)
+    sine = norm3(y)
+    if sine > 0.0:
+        y = along((0.0, 0.0, 0.0), 1.0 / sine, y)
     else:
-        y, lean, upright = (0.0, 0.0, 1.0), 0.0, 1.0
-    x, tangent = cross3(y, s), lean / upright
+        y, cosine, sine = (0.0, 0.0, 1.0), 0.0, 1.0
+    x, tangent = cross3(y, s), cosine / sine
     # Angular velocity and acceleration, in this frame.
     rate = dot3(s, v)
     wx, wy = -dot3(y, v) / length, dot3(x, v) / length
@@ -166,27 +166,28 @@ def leg_inertia(
     square = wx * wx + wy * wy
     ax = -(dot3(y, a) + 2.0 * rate * wx) / length + wy * wz
     ay = (dot3(x, a) - 2.0 * rate * wy) / length - wx * wz
-    cross_rate = (ax + wy * wz) / upright
-    az = lean * cross_rate + wx * wy
+    cross_rate = (ax + wy * wz) / sine
+    az = cosine * cross_rate + wx * wy
     # Euler's equations of cylinder and rod about the base joint.
     back = length - m[ROD_CENTRE]
     moment = m[MOMENT] + n * back
     ix, iy, iz = m[SIDE_X] + n * back * back, m[SIDE_Y] + n * back * back, m[SPIN]
-    slower = 2.0 * n * back * rate
-    tx = ix * ax + slower * wx + (iz - iy) * wy * wz + moment * dot3(y, g)
-    ty = iy * ay + slower * wy + (ix - iz) * wx * wz - moment * dot3(x, g)
+    # The rod goes farther out, so that the inertia about the base joint grows at this rate.
+    growth = 2.0 * n * back * rate
+    tx = ix * ax + growth * wx + (iz - iy) * wy * wz + moment * dot3(y, g)
+    ty = iy * ay + growth * wy + (ix - iz) * wx * wz - moment * dot3(x, g)
     tz = iz * az + (iy - ix) * wx * wy
-    about_first = tx + tangent * tz + m[CROSS] * cross_rate / upright
-    stretching = dot3(s, a) + length * square
-    outwards = n * (stretching - back * square - dot3(s, g))
+    about_first = tx + tangent * tz + m[CROSS] * cross_rate / sine
+    rate_change = dot3(s, a) + length * square
+    along_leg = n * (rate_change - back * square - dot3(s, g))
     across = total * (slide - g[0]) if on_guide else ty / length
-    at_end = combine((-across, about_first / length, -outwards), x, y, s)
-    # The sum of mass × acceleration is n a + tilting s̈, and s̈ that of the direction.
-    tilting = (m[MOMENT] - n * m[ROD_CENTRE]) / length
-    bend = along(a, -1.0, combine((2.0 * rate * wy, -2.0 * rate * wx, stretching), x, y, s))
-    whole = combine((total, -n, -tilting), g, a, bend)
-    whole = (whole[0] - total * slide, whole[1], whole[2])
-    return at_end, whole, (g[0] - slide) * (total * length - moment)
+    at_end = combine((-across, about_first / length, -along_leg), x, y, s)
+    # The sum of mass × acceleration is n a + swinging · l s̈, with l s̈ = a − l̈ s − 2 l̇ ṡ.
+    swinging = (m[MOMENT] - n * m[ROD_CENTRE]) / length
+    swing = along(a, -1.0, combine((2.0 * rate * wy, -2.0 * rate * wx, rate_change), x, y, s))
+    total_force = combine((total, -n, -swinging), g, a, swing)
+    total_force = (total_force[0] - total * slide, total_force[1], total_force[2])
+    return at_end, total_force, (g[0] - slide) * (total * length - moment)
 
 
 @kernel(
@@ -221,24 +222,26 @@ def inertia_rows(
         own = (dot3(x, turning), dot3(y, turning), dot3(z, turning))
         own_rate = (dot3(x, turning_rate), dot3(y, turning_rate), dot3(z, turning_rate))
         i, j, h = column(platform, 0), column(platform, 1), column(platform, 2)
-        change = along(combine(own_rate, i, j, h), 1.0, cross3(own, combine(own, i, j, h)))
-        fall, first = along(g, -1.0, a), combine(column(platform, 3), x, y, z)
-        whirl = acceleration_of((0.0, 0.0, 0.0), turning, turning_rate, first)
-        force = along((-whirl[0], -whirl[1], -whirl[2]), mass, fall)
-        moment = along(cross3(first, fall), -1.0, combine(change, x, y, z))
+        torque = along(combine(own_rate, i, j, h), 1.0, cross3(own, combine(own, i, j, h)))
+        # Mass × centre from b4, and mass × the acceleration of the centre beyond that of b4.
+        first_moment = combine(column(platform, 3), x, y, z)
+        inwards = acceleration_of((0.0, 0.0, 0.0), turning, turning_rate, first_moment)
+        from_b4 = along(g, -1.0, a)
+        force = along((-inwards[0], -inwards[1], -inwards[2]), mass, from_b4)
+        moment = along(cross3(first_moment, from_b4), -1.0, combine(torque, x, y, z))
         for leg in range(4):
             arm, on_guide = times(r, points[leg]), 0 < leg < 3
             end = along(p, 1.0, arm)
             if leg == 3:
                 end = (end[0] - variables[A3X], end[1] - variables[A3Y], end[2])
-            speed = along(v, 1.0, cross3(turning, arm))
-            rush = acceleration_of(a, turning, turning_rate, arm)
-            held, whole, bending = leg_inertia(end, speed, rush, g, on_guide, legs[leg])
-            force, moment = along(force, 1.0, held), along(moment, 1.0, cross3(arm, held))
+            end_v = along(v, 1.0, cross3(turning, arm))
+            end_a = acceleration_of(a, turning, turning_rate, arm)
+            at_end, total, on_carriage = leg_inertia(end, end_v, end_a, g, on_guide, legs[leg])
+            force, moment = along(force, 1.0, at_end), along(moment, 1.0, cross3(arm, at_end))
             if on_guide:
-                out[k, 17 + leg] = bending
+                out[k, 17 + leg] = on_carriage
             for axis in range(3):
-                out[k, 6 + 3 * leg + axis], out[k, 20 + 3 * leg + axis] = held[axis], whole[axis]
+                out[k, 6 + 3 * leg + axis], out[k, 20 + 3 * leg + axis] = at_end[axis], total[axis]
         for axis in range(3):
             out[k, axis], out[k, 3 + axis] = force[axis], moment[axis]
 
@@ -278,5 +281,5 @@ def carry_motion(
     wrench, along_guide = out[..., :6], out[..., 18:20]
     if c.tool.any():
         wrench[..., 3:] -= np.cross(c.arm, wrench[..., :3])
-    at_joints, whole = (out[..., i : i + 12].reshape(*c.batch, 4, 3) for i in (6, 20))
-    return Carried(wrench, at_joints, along_guide, whole)
+    at_joints, of_legs = (out[..., i : i + 12].reshape(*c.batch, 4, 3) for i in (6, 20))
+    return Carried(wrench, at_joints, along_guide, of_legs)
