@@ -94,6 +94,11 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.mass_kg * STANDARD_GRAVITY
 
 
+def or_infinite(six: Six | None) -> FloatArray:
+    """Return six limits or stiffnesses as an array (6,); infinite if there are none."""
+    return np.array(six or (math.inf,) * 6)
+
+
 class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Data of the six actuators, each six numbers in the order of `JOINTS`.
 
@@ -134,8 +139,7 @@ class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
         """Largest push and largest pull, each of shape (6,), in newtons; infinite for no limit."""
-        push = self.push_n or (math.inf,) * 6
-        return np.array(push), np.array(self.pull_n or push)
+        return or_infinite(self.push_n), or_infinite(self.pull_n or self.push_n)
 
 
 class Struts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -21,7 +21,7 @@ from explorer.legs.moves import StraightMoves
 from explorer.measures.blocks import block
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.machine import Six
+from explorer.mechanism.machine import or_infinite
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.time_law import TimeLaw
@@ -108,14 +108,9 @@ class Drives:
                 None for b4.
 
         Raises:
-            InputError: The path has no length, or the platform has no mass.
+            InputError: The path has no length.
             NoAnswerError: The path is singular.
         """
-        if not bodies.platform[3, 3] > 0.0:
-            raise InputError(
-                "the platform has no mass, so that no motion asks a force for it: give it a "
-                "density, or the design a payload"
-            )
         steps = np.diff(law.time)
         if not law.duration > 0.0:
             raise InputError("the path has no length: all its poses are the same")
@@ -185,7 +180,7 @@ class Drives:
         """For each actuator the limit of which it uses the most; None for one without limits."""
         limits = self.design.actuators
         speed, acceleration, continuous = map(
-            _or_infinite, (limits.speed_mm_s, limits.acceleration_mm_s2, limits.continuous_n)
+            or_infinite, (limits.speed_mm_s, limits.acceleration_mm_s2, limits.continuous_n)
         )
         push, pull = limits.limits
         shares = np.stack(
@@ -213,10 +208,6 @@ class Drives:
         """The least that one motor for all six actuators has to hold."""
         each = self.peak_force, self.rms_force, self.peak_speed, self.peak_power
         return LeastMotor(*(float(six.max()) for six in each))
-
-
-def _or_infinite(six: Six | None) -> FloatArray:
-    return np.full(6, np.inf) if six is None else np.array(six)
 
 
 def check_limits(design: Design, poses: Sequence[Pose], *, tool: ArrayLike | None = None) -> None:

@@ -29,6 +29,7 @@ from explorer.files.extras import load_extra
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.machine import or_infinite
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.statics.forces import forces_of
@@ -260,21 +261,20 @@ def _bounds(
     bends = joint_accelerations(design, c.position, c.rotation, twist, bend)
     limits = design.actuators
     speed, acceleration = (
-        np.full(6, np.inf) if six is None else np.array(six) / design.unit_mm
-        for six in (limits.speed_mm_s, limits.acceleration_mm_s2)
+        or_infinite(six) / design.unit_mm for six in (limits.speed_mm_s, limits.acceleration_mm_s2)
     )
     a, b = [rates], [bends]
     up = down = [np.broadcast_to(acceleration, rates.shape)]
     if bodies is not None:
         push, pull = limits.limits
         rest = np.zeros(6)
-        held, uneven, even = (
+        at_rest, with_change, with_rate = (
             forces_of(c, carry_motion(c, *motion, bodies).wrench)
             for motion in ((rest, rest), (rest, twist), (twist, bend))
         )
-        _check_held(held, push, pull)
-        a, b = [rates, uneven - held], [bends, even - held]
-        up, down = [*up, push - held], [*down, pull + held]
+        _check_held(at_rest, push, pull)
+        a, b = [rates, with_change - at_rest], [bends, with_rate - at_rest]
+        up, down = [*up, push - at_rest], [*down, pull + at_rest]
     squares = np.divide(speed, np.abs(rates), out=np.full(rates.shape, np.inf), where=rates != 0.0)
     a, b = (np.concatenate(each, axis=-1) for each in (a, b))
     return Bounds(
@@ -290,7 +290,7 @@ def _check_held(held: FloatArray, push: FloatArray, pull: FloatArray) -> None:
     if not np.isfinite(held).all():
         raise NoAnswerError("the path is singular, so that no forces move the platform along it")
     share = np.maximum(held / push, -held / pull)
-    if share.max() >= 1.0:
+    if share.max(initial=0.0) >= 1.0:
         place = np.unravel_index(share.argmax(), share.shape)
         raise NoAnswerError(
             f"no motion along the path keeps the limits: at rest the actuator of "

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
@@ -92,7 +93,8 @@ def drives_along(design: Design, path: TimedPath) -> Drives:
     """Return what a path within the limits of a design asks of its actuators.
 
     Raises:
-        InputError: The path leaves the limits or has no length, or nothing limits its time.
+        InputError: The path leaves the limits or has no length, the platform has no mass, or
+            nothing limits the time.
         MissingExtraError: toppra is not installed.
         NoAnswerError: The path is singular, or a weight exceeds the largest force at rest.
     """
@@ -118,7 +120,15 @@ def moving_bodies(design: Design, masses: Mapping[str, Mass]) -> MovingBodies:
     `bar_masses` or `explorer.prototype.assembly.Prototype.masses`. Cylinders and rods have their
     centres on their axes, and principal axes along those of their frames; the centre of a cross is
     at its joint.
+
+    Raises:
+        InputError: Neither the platform nor the payload has a mass.
     """
+    if not masses["platform"].mass + design.payload.mass_kg > 0.0:
+        raise InputError(
+            "the platform has no mass, so that no motion asks a force for it: give it a density, "
+            "or the design a payload"
+        )
     metres = 1e-3 * design.unit_mm
     platform = with_payload(design, masses)["platform"]
     off = platform.centre

@@ -18,10 +18,11 @@ from explorer.paths.drives import Drives, check_limits
 from explorer.paths.time_law import TimeLaw, law_at_speed, law_of_duration
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.dynamics import moving_bodies
-from explorer.prototype.weights import DENSITY, bar_masses, with_payload
+from explorer.prototype.weights import DENSITY, Mass, bar_masses, with_payload
 from explorer.statics.motion import MovingBodies
 
-OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], payload=Payload(2.0, (1, 0, 1)))
+EMPTY = PRESETS["paper-optimal"]
+OPTIMAL = msgspec.structs.replace(EMPTY, payload=Payload(2.0, (1, 0, 1)))
 HOME = OPTIMAL.home_pose
 X, Y, Z = HOME.position
 WAY = 3.0
@@ -132,9 +133,8 @@ def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
 
 def test_path_without_length_or_mass_or_through_a_singular_pose_is_refused() -> None:
     assert "no length" in refusal(lambda: law_of_duration(OPTIMAL, [HOME, HOME], 1.0))
-    law, massless = law_of_duration(OPTIMAL, ALONG_GUIDE, 1.0), bodies_of(OPTIMAL)
-    massless.platform[:] = 0.0
-    assert "no mass" in refusal(lambda: Drives.along(OPTIMAL, ALONG_GUIDE, law, massless))
+    massless = {**bar_masses(EMPTY, DENSITY), "platform": Mass(0.0, np.zeros(3), np.eye(3))}
+    assert "no mass" in refusal(lambda: moving_bodies(EMPTY, massless))
     assert "above zero" in refusal(law_of_duration, OPTIMAL, ALONG_GUIDE, math.nan)
     through = [HOME, Pose((X, Y, 0.0), HOME.quaternion)]
     with pytest.raises(NoAnswerError, match="singular"):

@@ -138,6 +138,8 @@ def test_law_of_shortest_time_takes_longer_by_as_much_as_its_limits_are_slower(
 def test_laws_rest_at_every_corner_and_lie_on_the_path() -> None:
     design, path = random_case(9)
     path.insert(1, path[1])
+    bodies = moving_bodies(design, bar_masses(design, DENSITY))
+    assert law_of_shortest_time(design, [HOME, HOME], bodies=bodies).duration == 0.0
     for law in (law_at_speed(design, path, 5.0, 20.0), law_of_shortest_time(design, path)):
         assert np.isfinite(law.time).all()
         assert_allclose(law.rate[np.isin(law.at, [0.0, 1.0, 2.0, 3.0])], 0.0, atol=1e-12)

@@ -10,6 +10,7 @@ import numpy as np
 from explorer.export.drawings.markup import coordinate, drawing_text, element, path_of
 from explorer.export.drawings.slices import ruler
 from explorer.mechanism.design import JOINTS
+from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.paths.drives import PLACES, Drives
@@ -55,7 +56,7 @@ def force_speed_chart(drives: Drives) -> Element:
     """Return the forces of the actuators against their speeds, with the limits as a box."""
     limits = drives.design.actuators
     push, pull = limits.limits
-    speed = np.full(6, np.inf) if limits.speed_mm_s is None else np.array(limits.speed_mm_s)
+    speed = or_infinite(limits.speed_mm_s)
     lows, highs = np.stack([-speed, -pull]), np.stack([speed, push])
     both = np.stack([drives.speed, drives.force])[:, _drawn(drives)]
     across, up = (
