@@ -202,6 +202,8 @@ def test_path_is_of_its_design() -> None:
     state = start_between(1, 5)
     other = SetVariable("b2", 2.7).apply(state)
     assert other.journey is None
+    heavier = Set("design.payload.mass_kg", 2.0).apply(state)
+    assert journey_of(heavier) == replace(journey_of(state), design=heavier.design)
     for action in (SetPathTime(1.0), Play(True)):
         with pytest.raises(InputError, match="no path for this design"):
             action.apply(other)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import msgspec
 import numpy as np
+from machines import same_for_all
 
 from benchmarks.samples import DESIGN, around_home
 from benchmarks.table import Row, seconds, times
@@ -13,6 +14,7 @@ from benchmarks.timing import best_of
 from explorer import (
     Actuators,
     Payload,
+    Pose,
     Struts,
     Tolerances,
     actuator_forces,
@@ -27,8 +29,11 @@ from explorer import (
 )
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import STANDARD_GRAVITY
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.compiled import warm
+from explorer.paths.time_law import DEFAULT_POINTS, law_of_shortest_time
+from explorer.prototype.dynamics import moving_bodies
+from explorer.prototype.weights import DENSITY, bar_masses
 from explorer.statics.accuracy import (
     actuator_errors,
     error_by_source,
@@ -124,6 +129,14 @@ def _motion() -> Iterator[Row]:
     yield Row(f"rates of the joints in {FORCE_POSES:,} motions", seconds(rates))
     changes = best_of(3, lambda: joint_accelerations(DESIGN, *motions))
     yield Row(f"accelerations of the joints in {FORCE_POSES:,} motions", seconds(changes))
+    home = carrying.home_pose
+    way = home, Pose(triple(np.array(home.position) + (2.0, -1.0, 1.0)), home.quaternion)
+    force, speed, acceleration = map(same_for_all, (100.0, 300.0, 5000.0))
+    limits = Actuators(force, speed_mm_s=speed, acceleration_mm_s2=acceleration)
+    timed = msgspec.structs.replace(carrying, actuators=limits)
+    bodies = moving_bodies(timed, bar_masses(timed, DENSITY))
+    shortest = best_of(3, lambda: law_of_shortest_time(timed, way, bodies=bodies))
+    yield Row(f"shortest time of a path of {DEFAULT_POINTS} points", seconds(shortest), "0.2 s")
 
 
 def _precision() -> Iterator[Row]:

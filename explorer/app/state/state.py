@@ -34,6 +34,8 @@ from explorer.singularity.colours import WARN_SHARE
 Joints = tuple[float, float, float, float, float, float]
 Folds = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
+# The fields of a design on which its paths depend.
+_OF_PATHS = tuple({*Design.__struct_fields__} - {"payload", "actuators"})
 # Difference of the entries of rotation matrices up to which they are the same but for rounding.
 SAME_ROTATION = 1e-12
 POINTS: dict[Point, str] = {"b4": "b4", "tool": "the tool"}
@@ -257,9 +259,16 @@ class State:
 
     @property
     def journey(self) -> Journey | None:
-        """The present path; None where there is none, or one made for another design."""
+        """The present path; None where there is none, or one made for another design.
+
+        It stays while a payload and actuators are chosen for it.
+        """
         journey = self.paths.journey
-        return journey if journey is not None and journey.design == self.design else None
+        if journey is None or journey.design == self.design:
+            return journey
+        if any(getattr(journey.design, name) != getattr(self.design, name) for name in _OF_PATHS):
+            return None
+        return replace(journey, design=self.design)
 
     @property
     def warn_below(self) -> float:
