@@ -112,7 +112,6 @@ def law_at_speed(
     acceleration: float,
     *,
     tool: ArrayLike | None = None,
-    points: int = DEFAULT_POINTS,
 ) -> TimeLaw:
     """Return the law by which the travel of the fastest actuator over each move is a trapezoid.
 
@@ -123,13 +122,12 @@ def law_at_speed(
         acceleration: Acceleration with which it reaches the speed and stops, in units/s².
         tool: Point that moves straight in the platform frame, shape (3,), in design units; None
             for b4.
-        points: Number of intervals of the grid over the whole path.
 
     Raises:
         InputError: There are too few poses, or the speed or the acceleration is not positive.
     """
     _check_positive(speed=speed, acceleration=acceleration)
-    return _trapezoids(design, poses, speed, acceleration, tool, points)
+    return _trapezoids(design, poses, speed, acceleration, tool)
 
 
 def law_of_duration(
@@ -138,7 +136,6 @@ def law_of_duration(
     duration: float,
     *,
     tool: ArrayLike | None = None,
-    points: int = DEFAULT_POINTS,
 ) -> TimeLaw:
     """Return the law of a duration in seconds whose fastest actuator accelerates the least.
 
@@ -150,7 +147,7 @@ def law_of_duration(
             length.
     """
     _check_positive(duration=duration)
-    law = _trapezoids(design, poses, math.inf, 1.0, tool, points)
+    law = _trapezoids(design, poses, math.inf, 1.0, tool)
     if law.duration == 0.0:
         raise InputError("the path has no length: all its poses are the same")
     return law.slower(duration / law.duration)
@@ -169,10 +166,9 @@ def _trapezoids(
     speed: float,
     acceleration: float,
     tool: ArrayLike | None,
-    points: int,
 ) -> TimeLaw:
     """Return the law at a speed with an acceleration; without a largest speed if it is infinite."""
-    moves, number, share = _grid(poses, tool, points)
+    moves, number, share = _grid(poses, tool)
     position, rotation = moves.poses(number, share)
     twist = moves.slopes(number, rotation)[0]
     slopes = np.abs(joint_rates(design, position, rotation, twist)).max(axis=-1)
@@ -235,7 +231,7 @@ def law_of_shortest_time(
 
 
 def _grid(
-    poses: Sequence[Pose], tool: ArrayLike | None, points: int
+    poses: Sequence[Pose], tool: ArrayLike | None, points: int = DEFAULT_POINTS
 ) -> tuple[StraightMoves, IntArray, FloatArray]:
     """Return the moves of a path, and number and share of grid points, shape (moves, n) each."""
     if len(poses) < 2:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from explorer.app.session.feed import Feed, feed_of
-from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.export.drawings.drives import force_speed_chart, time_charts
@@ -48,9 +47,5 @@ def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:
     return DrivesDrawing(tuple(drive_blocks(found)), charts)
 
 
-def _request_of(frame: Frame) -> DrivesRequest | None:
-    return request_for(frame.state)
-
-
 DrivesFeed: TypeAlias = Feed[DrivesRequest, DrivesDrawing | ExplorerError]
-DRIVES_FEED = feed_of(draw_drives, _request_of)
+DRIVES_FEED = feed_of(draw_drives, lambda frame: request_for(frame.state))
