@@ -8,30 +8,22 @@ because most drives turn the power of a brake into heat.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from explorer.errors import InputError, NoAnswerError
+from explorer.errors import InputError
 from explorer.legs.moves import StraightMoves
 from explorer.measures.blocks import block
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
-from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.time_law import TimeLaw
-from explorer.statics.forces import forces_of
-from explorer.statics.motion import (
-    MovingBodies,
-    carry_motion,
-    joint_accelerations,
-    joint_rates,
-)
+from explorer.paths.time_law import JointMotion, TimeLaw
+from explorer.statics.motion import MovingBodies
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import violations
 
@@ -89,49 +81,27 @@ class Drives:
     force: FloatArray
 
     @staticmethod
-    def along(
-        design: Design,
-        poses: Sequence[Pose],
-        law: TimeLaw,
-        bodies: MovingBodies,
-        *,
-        tool: ArrayLike | None = None,
-    ) -> Drives:
-        """Return what a path with a time law asks of the actuators.
-
-        Args:
-            design: The manipulator.
-            poses: Corners of the path, two or more.
-            law: Its time law.
-            bodies: Masses that the actuators move.
-            tool: Point that moves straight in the platform frame, shape (3,), in design units;
-                None for b4.
+    def along(design: Design, moves: StraightMoves, law: TimeLaw, bodies: MovingBodies) -> Drives:
+        """Return what moves with a time law ask of the actuators, given the masses that move.
 
         Raises:
             InputError: The path has no length.
             NoAnswerError: The path is singular.
         """
-        steps = np.diff(law.time)
         if not law.duration > 0.0:
             raise InputError("the path has no length: all its poses are the same")
+        steps = np.diff(law.time)
         moving = steps > 0.0
         time = (law.time[:-1][moving, None] + steps[moving, None] * np.array(PLACES)).ravel()
         at, rate, change = law.places(time)
         # The move of an interval, by its middle: to rounding its ends may be in another one.
         middle = 0.5 * (law.at[:-1] + law.at[1:])[moving]
         number = np.repeat(middle.astype(np.int64), len(PLACES))
-        moves = StraightMoves.along(poses, tool)
-        c = Configuration(design, *moves.poses(number, at - number))
-        slope, bend = moves.slopes(number, c.rotation)
-        twist, rates = rate[:, None] * slope, change[:, None] * slope + rate[:, None] ** 2 * bend
-        force = forces_of(c, carry_motion(c, twist, rates, bodies).wrench)
-        if not np.isfinite(force).all():
-            raise NoAnswerError(
-                "the path is singular, so that no forces move the platform along it"
-            )
-        place = c.position, c.rotation, twist
-        speed = design.unit_mm * joint_rates(design, *place)
-        acceleration = design.unit_mm * joint_accelerations(design, *place, rates)
+        motion = JointMotion.along(design, moves, number, at - number, bodies)
+        u, x = change[:, None], rate[:, None] ** 2
+        speed = design.unit_mm * rate[:, None] * motion.slope
+        acceleration = design.unit_mm * (u * motion.slope + x * motion.bend)
+        force = motion.held + u * motion.by_u + x * motion.by_x
         return Drives(design, law, time, speed, acceleration, force)
 
     @property
@@ -210,27 +180,25 @@ class Drives:
         return LeastMotor(*(float(six.max()) for six in each))
 
 
-def check_limits(design: Design, poses: Sequence[Pose], *, tool: ArrayLike | None = None) -> None:
-    """Check that a path keeps the limits and clearances of a design.
+def check_limits(design: Design, moves: StraightMoves) -> None:
+    """Check that moves keep the limits and clearances of a design.
 
     Raises:
-        InputError: It leaves them; the message says where.
+        InputError: They leave them; the message says where.
     """
-    moves, count = StraightMoves.along(poses, tool), len(poses) - 1
-    ends = [np.array([pose.position for pose in poses]), np.array([p.rotation for p in poses])]
-    valid = moves_are_valid(
-        design, *(end[:-1] for end in ends), *(end[1:] for end in ends), tool=tool
-    )
+    numbers, ends = np.arange(len(moves.step)), np.array([0.0, 1.0])
+    p, r = moves.poses(np.tile(numbers[:, None], 2), np.tile(ends, (len(numbers), 1)))
+    valid = moves_are_valid(design, p[:, 0], r[:, 0], p[:, 1], r[:, 1], tool=moves.tool)
     for move in np.flatnonzero(~valid).tolist():
-        which = "the path" if count == 1 else f"move {move + 1} of the path"
+        which = "the path" if len(numbers) == 1 else f"move {move + 1} of the path"
         share = np.linspace(0.0, 1.0, 101, dtype=np.float64)
         c = Configuration(design, *moves.poses(np.full(len(share), move), share))
-        broken = next(((s, b) for s, b in zip(share, violations(c), strict=True) if b), None)
-        if broken is None:
-            raise InputError(f"{which} does not keep the margins or clearances of the legs")
-        raise InputError(
-            f"{which} leaves the limits at {100.0 * broken[0]:.0f} % of its way: {broken[1][0]}"
-        )
+        for percent, broken in enumerate(violations(c)):
+            if broken:
+                raise InputError(
+                    f"{which} leaves the limits at {percent} % of its way: {broken[0]}"
+                )
+        raise InputError(f"{which} does not keep the margins or clearances of the legs")
 
 
 def drive_blocks(drives: Drives) -> Iterator[block.Block]:

@@ -3,7 +3,7 @@
 A law keeps the geometry of its path, so that it stops at every corner: the actuators would need
 infinite accelerations to pass one. It is the rate of the share of a move at grid points, between
 which the second derivative of the share is constant. One law goes at a given speed with a limited
-acceleration, one takes a given time, another the shortest that the limits of the actuators allow.
+acceleration, another takes the shortest time that the limits of the actuators allow.
 
 With x the squared rate and u the change of the rate, speeds bound x, and accelerations and forces
 bound sums a u + b x. These bounds hold at both ends of every interval between grid points, in which
@@ -16,13 +16,11 @@ is slowed down by the little by which a grid ten times finer shows it to exceed 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.errors import InputError, NoAnswerError
 from explorer.files.extras import load_extra
@@ -30,7 +28,6 @@ from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
-from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.statics.forces import forces_of
 from explorer.statics.motion import (
@@ -77,9 +74,17 @@ class TimeLaw:
         """Duration in seconds."""
         return float(self.time[-1])
 
-    def slower(self, factor: float) -> TimeLaw:
-        """Return this law with all times multiplied by a factor."""
-        return replace(self, time=factor * self.time, rate=self.rate / factor)
+    def lasting(self, duration: float) -> TimeLaw:
+        """Return this law with another duration in seconds.
+
+        Raises:
+            InputError: The duration is not above zero, or the path has no length.
+        """
+        _check_positive("duration", duration)
+        if self.duration == 0.0:
+            raise InputError("the path has no length: all its poses are the same")
+        slower = duration / self.duration
+        return TimeLaw(slower * self.time, self.at, self.rate / slower)
 
     def places(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return place, its rate and its second derivative at times (n,), each of shape (n,)."""
@@ -89,6 +94,48 @@ class TimeLaw:
         at = self.at[index] + rate * since + 0.5 * change[index] * since**2
         ends = self.at[index], self.at[index + 1]
         return np.clip(at, *ends), rate + change[index] * since, change[index]
+
+
+class JointMotion(NamedTuple):
+    """Motions of the joints and forces of the actuators at places of a path, (..., 6) each.
+
+    With x the squared rate of the share of a move and u the change of the rate, the speeds are
+    slope √x, the accelerations slope u + bend x, and the forces held + by_u u + by_x x, in design
+    units, seconds and newtons.
+    """
+
+    slope: FloatArray
+    bend: FloatArray
+    held: FloatArray
+    by_u: FloatArray
+    by_x: FloatArray
+
+    @staticmethod
+    def along(
+        design: Design,
+        moves: StraightMoves,
+        number: IntArray,
+        share: FloatArray,
+        bodies: MovingBodies,
+    ) -> JointMotion:
+        """Return those at shares of moves by number, shape (...) each.
+
+        Raises:
+            NoAnswerError: The path is singular there.
+        """
+        c = Configuration(design, *moves.poses(number, share))
+        place, rest = (design, c.position, c.rotation), np.zeros(6)
+        twist, bend = moves.slopes(number, c.rotation)
+        held, with_u, with_x = (
+            forces_of(c, carry_motion(c, *motion, bodies).wrench)
+            for motion in ((rest, rest), (rest, twist), (twist, bend))
+        )
+        if not np.isfinite(held).all():
+            raise NoAnswerError(
+                "the path is singular, so that no forces move the platform along it"
+            )
+        bends = joint_accelerations(*place, twist, bend)
+        return JointMotion(joint_rates(*place, twist), bends, held, with_u - held, with_x - held)
 
 
 class Bounds(NamedTuple):
@@ -104,71 +151,52 @@ class Bounds(NamedTuple):
     most: FloatArray
     square: FloatArray
 
+    @staticmethod
+    def of(design: Design, motion: JointMotion) -> Bounds:
+        """Return those of the limits of a design.
+
+        Raises:
+            NoAnswerError: A weight exceeds the largest force of an actuator at rest.
+        """
+        limits, (slope, bend, held, by_u, by_x) = design.actuators, motion
+        speed, acceleration = (
+            or_infinite(six) / design.unit_mm
+            for six in (limits.speed_mm_s, limits.acceleration_mm_s2)
+        )
+        push, pull = limits.limits
+        share = np.maximum(held / push, -held / pull)
+        if share.max(initial=0.0) >= 1.0:
+            place = np.unravel_index(share.argmax(), share.shape)
+            raise NoAnswerError(
+                f"no motion along the path keeps the limits: at rest the actuator of "
+                f"{JOINTS[int(place[-1])]} bears {abs(held[place]):.4g} N of at most "
+                f"{abs(held[place]) / share[place]:.4g} N"
+            )
+        even = np.broadcast_to(acceleration, slope.shape)
+        most = np.concatenate([even, push - held, even, pull + held], axis=-1)
+        a, b = (np.concatenate(each, axis=-1) for each in ((slope, by_u), (bend, by_x)))
+        fastest = np.divide(
+            speed, np.abs(slope), out=np.full(slope.shape, np.inf), where=slope != 0
+        )
+        a, b = (np.concatenate([each, -each], axis=-1) for each in (a, b))
+        return Bounds(a, b, most, fastest.min(axis=-1) ** 2)
+
 
 def law_at_speed(
-    design: Design,
-    poses: Sequence[Pose],
-    speed: float,
-    acceleration: float,
-    *,
-    tool: ArrayLike | None = None,
+    design: Design, moves: StraightMoves, speed: float = math.inf, acceleration: float = 1.0
 ) -> TimeLaw:
     """Return the law by which the travel of the fastest actuator over each move is a trapezoid.
 
-    Args:
-        design: The manipulator.
-        poses: Corners of the path, two or more.
-        speed: Speed of the fastest actuator, in design units per second.
-        acceleration: Acceleration with which it reaches the speed and stops, in units/s².
-        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
-            for b4.
+    It reaches the speed with the acceleration and stops with it, in design units and seconds. With
+    no largest speed it brakes from the middle of its travel on.
 
     Raises:
-        InputError: There are too few poses, or the speed or the acceleration is not positive.
+        InputError: There is no move, or the speed or the acceleration is not above zero.
     """
-    _check_positive(speed=speed, acceleration=acceleration)
-    return _trapezoids(design, poses, speed, acceleration, tool)
-
-
-def law_of_duration(
-    design: Design,
-    poses: Sequence[Pose],
-    duration: float,
-    *,
-    tool: ArrayLike | None = None,
-) -> TimeLaw:
-    """Return the law of a duration in seconds whose fastest actuator accelerates the least.
-
-    It accelerates over the first half of its travel in each move and brakes over the second one.
-    The other arguments are those of `law_at_speed`.
-
-    Raises:
-        InputError: There are too few poses, the duration is not positive, or the path has no
-            length.
-    """
-    _check_positive(duration=duration)
-    law = _trapezoids(design, poses, math.inf, 1.0, tool)
-    if law.duration == 0.0:
-        raise InputError("the path has no length: all its poses are the same")
-    return law.slower(duration / law.duration)
-
-
-def _check_positive(**values: float) -> None:
-    """Check that numbers, by their names, are finite and above zero."""
-    for name, value in values.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"the {name} must be above zero; got {value:g}")
-
-
-def _trapezoids(
-    design: Design,
-    poses: Sequence[Pose],
-    speed: float,
-    acceleration: float,
-    tool: ArrayLike | None,
-) -> TimeLaw:
-    """Return the law at a speed with an acceleration; without a largest speed if it is infinite."""
-    moves, number, share = _grid(poses, tool)
+    _check_positive("acceleration", acceleration)
+    if speed != math.inf:
+        _check_positive("speed", speed)
+    number, share = _grid(moves, DEFAULT_POINTS)
     position, rotation = moves.poses(number, share)
     twist = moves.slopes(number, rotation)[0]
     slopes = np.abs(joint_rates(design, position, rotation, twist)).max(axis=-1)
@@ -180,33 +208,21 @@ def _trapezoids(
 
 
 def law_of_shortest_time(
-    design: Design,
-    poses: Sequence[Pose],
-    *,
-    tool: ArrayLike | None = None,
-    bodies: MovingBodies | None = None,
-    points: int = DEFAULT_POINTS,
+    design: Design, moves: StraightMoves, bodies: MovingBodies, *, points: int = DEFAULT_POINTS
 ) -> TimeLaw:
     """Return the law of the shortest time within speeds, accelerations and forces of the actuators.
 
-    Needs the extra `timing`.
-
-    Args:
-        design: The manipulator, whose actuators have the limits.
-        poses: Corners of the path, two or more.
-        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
-            for b4.
-        bodies: Masses that the forces accelerate and hold; None to leave the forces out.
-        points: Number of intervals of the grid over the whole path.
+    Needs the extra `timing`. The forces hold and accelerate bodies. The grid has a number of points
+    over the whole path.
 
     Raises:
-        InputError: There are too few poses, or no limit bounds the acceleration.
+        InputError: There is no move, or no limit bounds the acceleration.
         MissingExtraError: toppra is not installed.
         NoAnswerError: A weight exceeds the largest force of an actuator at rest, or the path is
             singular.
     """
-    moves, number, share = _grid(poses, tool, points)
-    bounds = _bounds(design, moves, number, share, bodies)
+    number, share = _grid(moves, points)
+    bounds = Bounds.of(design, JointMotion.along(design, moves, number, share, bodies))
     moving = (moves.step != 0.0).any(axis=1) | (moves.turn != 0.0).any(axis=1)
     sides = np.sign(bounds.a) * np.isfinite(bounds.most)
     if not ((sides.max(axis=-1) > 0.0) & (sides.min(axis=-1) < 0.0))[moving].all():
@@ -219,80 +235,32 @@ def law_of_shortest_time(
     for move in np.flatnonzero(moving):
         squares[move] = _greatest_squares(Bounds(*(each[move] for each in bounds)))
     law = TimeLaw.of(np.sqrt(squares))
+    if not moving.any():
+        return law
     # Between grid points a limit may be exceeded by a little.
     steps = np.linspace(0.0, 1.0, PARTS, endpoint=False, dtype=np.float64)
     times = (law.time[:-1, None] + steps * np.diff(law.time)[:, None]).ravel()
     at, rate, change = law.places(times[np.repeat(np.diff(law.time) > 0.0, PARTS)])
-    number = np.minimum(at.astype(np.int64), len(poses) - 2)
-    finer = _bounds(design, moves, number, at - number, bodies)
+    number = np.minimum(at.astype(np.int64), len(moves.step) - 1)
+    finer = Bounds.of(design, JointMotion.along(design, moves, number, at - number, bodies))
     asked = (finer.a * change[:, None] + finer.b * rate[:, None] ** 2) / finer.most
-    excess = max(asked.max(initial=1.0), (rate**2 / finer.square).max(initial=1.0))
-    return law.slower(math.sqrt(excess))
+    excess = max(1.0, asked.max(), (rate**2 / finer.square).max())
+    return law.lasting(law.duration * math.sqrt(excess))
 
 
-def _grid(
-    poses: Sequence[Pose], tool: ArrayLike | None, points: int = DEFAULT_POINTS
-) -> tuple[StraightMoves, IntArray, FloatArray]:
-    """Return the moves of a path, and number and share of grid points, shape (moves, n) each."""
-    if len(poses) < 2:
+def _check_positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0.0):
+        raise InputError(f"the {name} must be above zero; got {value:g}")
+
+
+def _grid(moves: StraightMoves, points: int) -> tuple[IntArray, FloatArray]:
+    """Return number and share of grid points of moves, shape (moves, n) each."""
+    count = len(moves.step)
+    if not count:
         raise InputError("a time law needs a path of at least two poses")
-    moves, count = StraightMoves.along(poses, tool), len(poses) - 1
     intervals = max(LEAST_INTERVALS, math.ceil(points / count))
     share = np.linspace(0.0, 1.0, intervals + 1, dtype=np.float64)
-    number = np.repeat(np.arange(count)[:, None], len(share), axis=1)
-    return moves, number, np.tile(share, (count, 1))
-
-
-def _bounds(
-    design: Design,
-    moves: StraightMoves,
-    number: IntArray,
-    share: FloatArray,
-    bodies: MovingBodies | None,
-) -> Bounds:
-    """Return the bounds at shares of moves by number, shape (...) each."""
-    c = Configuration(design, *moves.poses(number, share))
-    twist, bend = moves.slopes(number, c.rotation)
-    rates = joint_rates(design, c.position, c.rotation, twist)
-    bends = joint_accelerations(design, c.position, c.rotation, twist, bend)
-    limits = design.actuators
-    speed, acceleration = (
-        or_infinite(six) / design.unit_mm for six in (limits.speed_mm_s, limits.acceleration_mm_s2)
-    )
-    a, b = [rates], [bends]
-    up = down = [np.broadcast_to(acceleration, rates.shape)]
-    if bodies is not None:
-        push, pull = limits.limits
-        rest = np.zeros(6)
-        at_rest, with_change, with_rate = (
-            forces_of(c, carry_motion(c, *motion, bodies).wrench)
-            for motion in ((rest, rest), (rest, twist), (twist, bend))
-        )
-        _check_held(at_rest, push, pull)
-        a, b = [rates, with_change - at_rest], [bends, with_rate - at_rest]
-        up, down = [*up, push - at_rest], [*down, pull + at_rest]
-    squares = np.divide(speed, np.abs(rates), out=np.full(rates.shape, np.inf), where=rates != 0.0)
-    a, b = (np.concatenate(each, axis=-1) for each in (a, b))
-    return Bounds(
-        np.concatenate([a, -a], axis=-1),
-        np.concatenate([b, -b], axis=-1),
-        np.concatenate([*up, *down], axis=-1),
-        squares.min(axis=-1) ** 2,
-    )
-
-
-def _check_held(held: FloatArray, push: FloatArray, pull: FloatArray) -> None:
-    """Check that the actuators hold the weights at rest, with forces (..., 6) in newtons."""
-    if not np.isfinite(held).all():
-        raise NoAnswerError("the path is singular, so that no forces move the platform along it")
-    share = np.maximum(held / push, -held / pull)
-    if share.max(initial=0.0) >= 1.0:
-        place = np.unravel_index(share.argmax(), share.shape)
-        raise NoAnswerError(
-            f"no motion along the path keeps the limits: at rest the actuator of "
-            f"{JOINTS[int(place[-1])]} bears {abs(held[place]):.4g} N of at most "
-            f"{abs(held[place]) / share[place]:.4g} N"
-        )
+    return np.repeat(np.arange(count)[:, None], len(share), axis=1), np.tile(share, (count, 1))
 
 
 def _greatest_squares(bounds: Bounds) -> FloatArray:

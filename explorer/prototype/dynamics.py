@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.drives import Drives, check_limits
-from explorer.paths.time_law import TimeLaw, law_of_duration, law_of_shortest_time
+from explorer.paths.time_law import TimeLaw, law_at_speed, law_of_shortest_time
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains
 from explorer.prototype.weights import DENSITY, Mass, bar_masses, with_payload
 from explorer.statics.forces import forces_of
@@ -98,14 +99,14 @@ def drives_along(design: Design, path: TimedPath) -> Drives:
         MissingExtraError: toppra is not installed.
         NoAnswerError: The path is singular, or a weight exceeds the largest force at rest.
     """
-    poses, law, tool, density = path
-    check_limits(design, poses, tool=tool)
-    bodies = moving_bodies(design, bar_masses(design, density))
+    moves, law = StraightMoves.along(path.poses, path.tool), path.law
+    check_limits(design, moves)
+    bodies = moving_bodies(design, bar_masses(design, path.density))
     if law is None:
-        law = law_of_shortest_time(design, poses, tool=tool, bodies=bodies)
+        law = law_of_shortest_time(design, moves, bodies)
     elif not isinstance(law, TimeLaw):
-        law = law_of_duration(design, poses, law, tool=tool)
-    return Drives.along(design, poses, law, bodies, tool=tool)
+        law = law_at_speed(design, moves).lasting(law)
+    return Drives.along(design, moves, law, bodies)
 
 
 @lru_cache(16)

@@ -27,6 +27,7 @@ from explorer import (
     largest_force,
     strut_bending,
 )
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.numerics.arrays import FloatArray, triple
@@ -135,7 +136,7 @@ def _motion() -> Iterator[Row]:
     limits = Actuators(force, speed_mm_s=speed, acceleration_mm_s2=acceleration)
     timed = msgspec.structs.replace(carrying, actuators=limits)
     bodies = moving_bodies(timed, bar_masses(timed, DENSITY))
-    shortest = best_of(3, lambda: law_of_shortest_time(timed, way, bodies=bodies))
+    shortest = best_of(3, lambda: law_of_shortest_time(timed, StraightMoves.along(way), bodies))
     yield Row(f"shortest time of a path of {DEFAULT_POINTS} points", seconds(shortest), "0.2 s")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import msgspec
@@ -38,7 +37,7 @@ def test_drives_of_a_table_of_corners_and_their_csv_agree(cli: CommandLine, tmp_
     assert "A motor that holds all this needs at least" in cli.text(*words)
 
 
-def test_drives_take_the_answer_of_path_and_the_shortest_time_of_a_design(
+def test_drives_take_the_corners_of_a_planned_path_and_the_shortest_time_of_a_design(
     cli: CommandLine, tmp_path: Path
 ) -> None:
     limits = explorer.Actuators(
@@ -47,13 +46,10 @@ def test_drives_take_the_answer_of_path_and_the_shortest_time_of_a_design(
         acceleration_mm_s2=same_for_all(2000.0),
     )
     design = msgspec.structs.replace(explorer.PRESETS["paper-optimal"], actuators=limits)
-    home, answer = design.home_pose, tmp_path / "path.json"
-    corners = [
-        {"position": position, "quaternion": home.quaternion, "folds": []}
-        for position in (home.position, [12.0, 4.0, 8.0])
-    ]
-    answer.write_text(json.dumps({"found": True, "poses": corners}), encoding="utf-8")
-    by_file = cli.answer("--path", answer, "--payload", "2", "--design", design)
+    pytest.importorskip("ompl")
+    corners = tmp_path / "corners.csv"
+    assert CommandLine("path").answer(*MOVE[:4], "--design", design, "--corners", corners)["found"]
+    by_file = cli.answer("--path", corners, "--payload", "2", "--design", design)
     assert by_file == cli.answer(*MOVE, "--design", design)
     assert max(each["share"] for each in by_file["binding"]) == pytest.approx(1.0, abs=1e-6)
     assert {each["limit"] for each in by_file["binding"]} <= {"speed", "acceleration", "push"}
@@ -83,6 +79,3 @@ def test_drives_refuse_a_path_that_is_in_time_already(cli: CommandLine, tmp_path
     assert "give the corners alone" in cli.refusal("--path", table, "--duration", "1")
     table.write_text("x,y,z\n10,5,9\n", encoding="utf-8")
     assert "at least two poses" in cli.refusal("--path", table, "--duration", "1")
-    answer = tmp_path / "path.json"
-    answer.write_text('{"found": false, "poses": []}', encoding="utf-8")
-    assert "no answer of explorer path" in cli.refusal("--path", answer, "--duration", "1")

@@ -12,10 +12,12 @@ from numpy.testing import assert_allclose
 from refusals import refusal
 
 from explorer import PRESETS, Actuators, Design, NoAnswerError, Payload, Pose
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import triple
 from explorer.paths.drives import Drives, check_limits
-from explorer.paths.time_law import TimeLaw, law_at_speed, law_of_duration
+from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.dynamics import moving_bodies
 from explorer.prototype.weights import DENSITY, Mass, bar_masses, with_payload
@@ -42,8 +44,12 @@ def bodies_of(design: Design) -> MovingBodies:
     return moving_bodies(design, bar_masses(design, DENSITY))
 
 
-def drives_of(design: Design, path: list[Pose], law: TimeLaw, **options: object) -> Drives:
-    return Drives.along(design, path, law, bodies_of(design), **options)  # pyright: ignore
+def drives_of(design: Design, path: list[Pose], law: TimeLaw, tool: Triple | None = None) -> Drives:
+    return Drives.along(design, StraightMoves.along(path, tool), law, bodies_of(design))
+
+
+def law_of_duration(path: list[Pose], duration: float, tool: Triple | None = None) -> TimeLaw:
+    return law_at_speed(OPTIMAL, StraightMoves.along(path, tool)).lasting(duration)
 
 
 def potential_energy(design: Design, pose: Pose) -> float:
@@ -64,10 +70,10 @@ def test_work_of_the_actuators_from_rest_to_rest_is_the_change_of_potential_ener
     path = random_path(seed)
     before, after = (potential_energy(OPTIMAL, pose) for pose in (path[0], path[-1]))
     for law in (
-        law_of_duration(OPTIMAL, path, 0.4, tool=TOOL),
-        law_at_speed(OPTIMAL, path, 20.0, 200.0, tool=TOOL),
+        law_of_duration(path, 0.4, TOOL),
+        law_at_speed(OPTIMAL, StraightMoves.along(path, TOOL), 20.0, 200.0),
     ):
-        found = drives_of(OPTIMAL, path, law, tool=TOOL)
+        found = drives_of(OPTIMAL, path, law, TOOL)
         work = float(found.mean(found.power).sum()) * found.duration
         size = found.duration * float(found.mean_power.sum())
         assert work == pytest.approx(after - before, abs=1e-4 * size)
@@ -76,7 +82,7 @@ def test_work_of_the_actuators_from_rest_to_rest_is_the_change_of_potential_ener
 @pytest.mark.parametrize("seed", range(3))
 def test_peaks_bound_means_and_the_least_motor_bounds_all_actuators(seed: int) -> None:
     path = random_path(seed)
-    found = drives_of(OPTIMAL, path, law_of_duration(OPTIMAL, path, 0.3))
+    found = drives_of(OPTIMAL, path, law_of_duration(path, 0.3))
     assert found.duration == pytest.approx(0.3)
     assert (found.rms_force <= found.peak_force).all()
     assert (found.mean_power <= found.peak_power).all()
@@ -87,11 +93,11 @@ def test_peaks_bound_means_and_the_least_motor_bounds_all_actuators(seed: int) -
 
 def test_slower_law_has_slower_speeds_and_in_the_end_the_forces_at_rest() -> None:
     path = random_path(1)
-    law = law_of_duration(OPTIMAL, path, 0.3)
-    found, slower = (drives_of(OPTIMAL, path, each) for each in (law, law.slower(3.0)))
+    law = law_of_duration(path, 0.3)
+    found, slower = (drives_of(OPTIMAL, path, each) for each in (law, law.lasting(0.9)))
     assert_allclose(slower.speed, found.speed / 3.0, rtol=1e-6, atol=1e-9)
     assert_allclose(slower.acceleration, found.acceleration / 9.0, rtol=1e-6, atol=1e-6)
-    still = drives_of(OPTIMAL, path, law.slower(1e5))
+    still = drives_of(OPTIMAL, path, law.lasting(3e4))
     # What a motion adds to the forces at rest falls with the square of the time.
     added, less = found.force - still.force, slower.force - still.force
     assert_allclose(less, added / 9.0, atol=1e-6 * np.abs(added).max())
@@ -102,8 +108,8 @@ def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
     bodies = bodies_of(OPTIMAL).without_legs()
     bodies.platform[:] = 0.0
     bodies.platform[3, 3] = 1e-3 * OPTIMAL.unit_mm * mass
-    law = law_of_duration(OPTIMAL, ALONG_GUIDE, duration)
-    found = Drives.along(OPTIMAL, ALONG_GUIDE, law, bodies)
+    law = law_of_duration(ALONG_GUIDE, duration)
+    found = Drives.along(OPTIMAL, StraightMoves.along(ALONG_GUIDE), law, bodies)
     way = OPTIMAL.unit_mm * WAY
     assert_allclose(found.peak_speed[[1, 3]], 2.0 * way / duration, rtol=1e-3)
     assert_allclose(np.abs(found.acceleration[:, [1, 3]]), 4.0 * way / duration**2, rtol=1e-2)
@@ -114,7 +120,7 @@ def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
 
 def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
     path = random_path(2)
-    law = law_of_duration(OPTIMAL, path, 0.3)
+    law = law_of_duration(path, 0.3)
     found = drives_of(OPTIMAL, path, law)
     assert found.binding == (None,) * 6
     limits = Actuators(
@@ -132,18 +138,18 @@ def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
 
 
 def test_path_without_length_or_mass_or_through_a_singular_pose_is_refused() -> None:
-    assert "no length" in refusal(lambda: law_of_duration(OPTIMAL, [HOME, HOME], 1.0))
+    assert "no length" in refusal(lambda: law_of_duration([HOME, HOME], 1.0))
     massless = {**bar_masses(EMPTY, DENSITY), "platform": Mass(0.0, np.zeros(3), np.eye(3))}
     assert "no mass" in refusal(lambda: moving_bodies(EMPTY, massless))
-    assert "above zero" in refusal(law_of_duration, OPTIMAL, ALONG_GUIDE, math.nan)
+    assert "above zero" in refusal(law_of_duration, ALONG_GUIDE, math.nan)
     through = [HOME, Pose((X, Y, 0.0), HOME.quaternion)]
     with pytest.raises(NoAnswerError, match="singular"):
-        drives_of(OPTIMAL, through, law_of_duration(OPTIMAL, through, 1.0))
+        drives_of(OPTIMAL, through, law_of_duration(through, 1.0))
 
 
 def test_path_beyond_the_limits_is_refused_with_the_place_and_the_limit() -> None:
-    check_limits(OPTIMAL, ALONG_GUIDE)
+    check_limits(OPTIMAL, StraightMoves.along(ALONG_GUIDE))
     far = Pose((X, 40.0, Z), HOME.quaternion)
-    words = refusal(lambda: check_limits(OPTIMAL, [*ALONG_GUIDE, far]))
+    words = refusal(lambda: check_limits(OPTIMAL, StraightMoves.along([*ALONG_GUIDE, far])))
     assert words.startswith("move 2 of the path leaves the limits at ")
     assert "above its maximum" in words

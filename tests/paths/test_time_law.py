@@ -23,10 +23,13 @@ from explorer import (
     joint_rates,
 )
 from explorer.legs.moves import StraightMoves
-from explorer.paths.time_law import TimeLaw, law_at_speed, law_of_shortest_time
+from explorer.mechanism.pose import Triple
+from explorer.paths import time_law
+from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.paths.trajectory import trajectory
 from explorer.prototype.dynamics import moving_bodies
 from explorer.prototype.weights import bar_masses
+from explorer.statics.motion import MovingBodies
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose
@@ -67,6 +70,17 @@ def random_case(seed: int) -> tuple[Design, list[Pose]]:
     return msgspec.structs.replace(design, actuators=actuators), [HOME, *poses]
 
 
+def law_of_shortest_time(
+    design: Design, path: list[Pose], tool: Triple | None = None, **options: int
+) -> TimeLaw:
+    moves, bodies = StraightMoves.along(path, tool), bodies_of(design)
+    return time_law.law_of_shortest_time(design, moves, bodies, **options)
+
+
+def bodies_of(design: Design) -> MovingBodies:
+    return moving_bodies(design, bar_masses(design, DENSITY))
+
+
 def shares_of_limits(design: Design, path: list[Pose], law: TimeLaw) -> np.ndarray:
     """Return shares of speeds, accelerations and forces on a grid ten times finer, (n, 3, 6)."""
     parts = np.linspace(0.0, 1.0, 10, endpoint=False, dtype=np.float64)
@@ -100,7 +114,7 @@ def test_laws_along_the_guide_have_the_time_of_a_bang_bang_motion(
     reaches_speed = speed**2 / acceleration < WAY
     trapezoid, triangle = WAY / speed + speed / acceleration, 2.0 * math.sqrt(WAY / acceleration)
     expected = trapezoid if reaches_speed else triangle
-    steady = law_at_speed(OPTIMAL, ALONG_GUIDE, speed, acceleration)
+    steady = law_at_speed(OPTIMAL, StraightMoves.along(ALONG_GUIDE), speed, acceleration)
     shortest = law_of_shortest_time(limited(speed, acceleration), ALONG_GUIDE)
     assert steady.duration == pytest.approx(expected, rel=1e-3)
     assert shortest.duration == pytest.approx(expected, rel=1e-3)
@@ -109,12 +123,11 @@ def test_laws_along_the_guide_have_the_time_of_a_bang_bang_motion(
 @pytest.mark.parametrize("seed", range(6))
 def test_law_of_shortest_time_exceeds_no_limit_and_uses_one_everywhere(seed: int) -> None:
     design, path = random_case(seed)
-    bodies = moving_bodies(design, bar_masses(design, DENSITY))
-    law = law_of_shortest_time(design, path, tool=TOOL, bodies=bodies)
+    law = law_of_shortest_time(design, path, TOOL)
     shares = shares_of_limits(design, path, law)
     assert shares.max() <= 1.0 + 1e-9
     assert (shares.max(axis=(1, 2)) > 0.98).mean() > 0.98
-    finer = law_of_shortest_time(design, path, tool=TOOL, bodies=bodies, points=1600)
+    finer = law_of_shortest_time(design, path, TOOL, points=1600)
     assert law.duration == pytest.approx(finer.duration, rel=5e-3)
 
 
@@ -126,21 +139,30 @@ def test_law_of_shortest_time_takes_longer_by_as_much_as_its_limits_are_slower(
     limits = design.actuators
     assert limits.speed_mm_s
     assert limits.acceleration_mm_s2
-    weaker = Actuators(
-        speed_mm_s=six(np.array(limits.speed_mm_s) / slower),
-        acceleration_mm_s2=six(np.array(limits.acceleration_mm_s2) / slower**2),
+    law, longer = (
+        law_of_shortest_time(
+            msgspec.structs.replace(
+                design,
+                actuators=Actuators(
+                    speed_mm_s=six(np.array(limits.speed_mm_s) / factor),
+                    acceleration_mm_s2=six(np.array(limits.acceleration_mm_s2) / factor**2),
+                ),
+            ),
+            path,
+        )
+        for factor in (1.0, slower)
     )
-    law = law_of_shortest_time(design, path)
-    longer = law_of_shortest_time(msgspec.structs.replace(design, actuators=weaker), path)
     assert longer.duration == pytest.approx(slower * law.duration, rel=1e-6)
 
 
 def test_laws_rest_at_every_corner_and_lie_on_the_path() -> None:
     design, path = random_case(9)
     path.insert(1, path[1])
-    bodies = moving_bodies(design, bar_masses(design, DENSITY))
-    assert law_of_shortest_time(design, [HOME, HOME], bodies=bodies).duration == 0.0
-    for law in (law_at_speed(design, path, 5.0, 20.0), law_of_shortest_time(design, path)):
+    assert law_of_shortest_time(design, [HOME, HOME]).duration == 0.0
+    for law in (
+        law_at_speed(design, StraightMoves.along(path), 5.0, 20.0),
+        law_of_shortest_time(design, path),
+    ):
         assert np.isfinite(law.time).all()
         assert_allclose(law.rate[np.isin(law.at, [0.0, 1.0, 2.0, 3.0])], 0.0, atol=1e-12)
         found = trajectory(design, path, law=law, samples=2001)
@@ -153,7 +175,7 @@ def test_laws_rest_at_every_corner_and_lie_on_the_path() -> None:
 
 def test_law_at_speed_has_the_speed_and_the_acceleration() -> None:
     _, path = random_case(4)
-    law = law_at_speed(OPTIMAL, path, 4.0, 20.0, tool=TOOL)
+    law = law_at_speed(OPTIMAL, StraightMoves.along(path, TOOL), 4.0, 20.0)
     found = trajectory(OPTIMAL, path, law=law, samples=4001, tool=TOOL)
     speeds = np.abs(np.diff(found.joints, axis=0)).max(axis=1) / np.diff(found.time)
     changes = np.abs(np.diff(speeds)) / np.diff(found.time)[1:]
@@ -169,22 +191,22 @@ def test_law_without_a_limit_or_a_mass_is_refused_in_a_sentence() -> None:
     fast = msgspec.structs.replace(OPTIMAL, actuators=Actuators(speed_mm_s=same_for_all(10.0)))
     assert "nothing limits" in refusal(lambda: law_of_shortest_time(fast, ALONG_GUIDE))
     strong = msgspec.structs.replace(OPTIMAL, actuators=Actuators(push_n=same_for_all(10.0)))
-    massless = moving_bodies(strong, bar_masses(strong, DENSITY)).without_legs()
+    massless = bodies_of(strong).without_legs()
     massless.platform[:] = 0.0
-    words = refusal(lambda: law_of_shortest_time(strong, ALONG_GUIDE, bodies=massless))
+    moves = StraightMoves.along(ALONG_GUIDE)
+    words = refusal(time_law.law_of_shortest_time, strong, moves, massless)
     assert "masses to move" in words
     for speed, acceleration in ((0.0, 1.0), (1.0, -1.0), (1.0, math.nan)):
-        words = refusal(law_at_speed, OPTIMAL, ALONG_GUIDE, speed, acceleration)
+        words = refusal(law_at_speed, OPTIMAL, moves, speed, acceleration)
         assert "above zero" in words
-    assert "two poses" in refusal(lambda: law_at_speed(OPTIMAL, [HOME], 1.0, 1.0))
+    assert "two poses" in refusal(law_at_speed, OPTIMAL, StraightMoves.along([HOME]), 1.0, 1.0)
 
 
 def test_law_of_a_path_that_cannot_be_held_or_is_singular_is_refused() -> None:
     weak = limited(1.0, 1.0, force=5.0)
-    bodies = moving_bodies(weak, bar_masses(weak, DENSITY))
     with pytest.raises(NoAnswerError, match=r"at rest the actuator of .* of at most 5 N"):
-        law_of_shortest_time(weak, ALONG_GUIDE, bodies=bodies)
+        law_of_shortest_time(weak, ALONG_GUIDE)
     through = [HOME, Pose((X, Y, 0.0), HOME.quaternion)]
     strong = limited(1.0, 1.0, force=1e6)
     with pytest.raises(NoAnswerError, match="singular"):
-        law_of_shortest_time(strong, through, bodies=bodies)
+        law_of_shortest_time(strong, through)

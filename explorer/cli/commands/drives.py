@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
-
-import msgspec
 
 from explorer.cli import options, output, values
 from explorer.errors import InputError
 from explorer.export.pose_tables import MOST_BYTES, parse_table, read_poses
 from explorer.export.tables import drives_csv
 from explorer.files.writing import check_writable, read_at_most
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose, Quadruple, Triple
+from explorer.mechanism.pose import Pose
 from explorer.paths.drives import Drives as DrivesOfPath, drive_blocks
 from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.paths.trajectory import trajectory
 from explorer.prototype.dynamics import TimedPath, drives_along
 from explorer.prototype.weights import DENSITY
-
-
-class _Corner(msgspec.Struct, frozen=True):
-    """A pose in the answer of `explorer path --json`."""
-
-    position: Triple
-    quaternion: Quadruple
-
-
-class _Answer(msgspec.Struct, frozen=True):
-    """The part of the answer of `explorer path --json` that gives its corners."""
-
-    poses: Annotated[list[_Corner], msgspec.Meta(min_length=2)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,8 +33,8 @@ class Drives(options.JsonOptions, options.PathEndOptions):
     """
 
     path: Annotated[Path | None, values.hint("instead of --from and --to", "FILE")] = None
-    """Corners of the path: a table of poses as that of `explorer inverse --poses`, or the answer of
-    `explorer path --json` in a file that ends in .json."""
+    """Corners of the path: a table of poses as that of `explorer inverse --poses`, such as
+    `explorer path --corners` writes."""
 
     duration: Annotated[values.Positive, values.hint("default: the shortest")] = None
     """Duration in seconds, with the least acceleration of the fastest actuator."""
@@ -81,19 +67,14 @@ class Drives(options.JsonOptions, options.PathEndOptions):
         if self.out is not None:
             check_writable(self.out)
         poses, tool = self._poses(design), self.tool(design)
-        path = TimedPath(poses, self._law(design, poses, tool), tool, self.density)
-        found = drives_along(design, path)
-        files: dict[Path, bytes] = {}
-        if self.out is not None:
-            timed = trajectory(design, poses, law=found.law, samples=self.samples, tool=tool)
-            files[self.out] = drives_csv(found, timed).encode()
+        law = self._law(design, StraightMoves.along(poses, tool))
+        found = drives_along(design, TimedPath(poses, law, tool, self.density))
+        timed = trajectory(design, poses, law=found.law, samples=self.samples, tool=tool)
+        files = {} if self.out is None else {self.out: drives_csv(found, timed).encode()}
         written, errors = options.write_files(files)
-        out = next(iter(written), None)
-        self.write(
-            lambda: _drives_json(found) | ({} if out is None else {"file": out}),
-            _drive_lines(found, None if out is None else (self.samples, out)),
-            errors,
-        )
+        lines = [output.heading(design), *output.block_lines(drive_blocks(found))]
+        lines += [line for file in written for line in ("", f"{self.samples} rows in {file}")]
+        self.write(lambda: _drives_json(found, written), lines, errors)
 
     def _poses(self, design: Design) -> tuple[Pose, ...]:
         """Return the corners of the path."""
@@ -106,27 +87,16 @@ class Drives(options.JsonOptions, options.PathEndOptions):
             return start, goal
         if goal is not None or start != design.home_pose:
             raise InputError("--path has the ends of the path; leave --from and --to out")
-        data = read_at_most(self.path, MOST_BYTES)
-        if self.path.suffix.lower() == ".json":
-            try:
-                corners = msgspec.json.decode(data, type=_Answer).poses
-            except msgspec.MsgspecError as error:
-                raise InputError(
-                    f"{self.path} is no answer of explorer path --json: {error}"
-                ) from None
-            return tuple(Pose(each.position, each.quaternion) for each in corners)
-        table = parse_table(str(self.path), data, design.unit_mm)
+        table = parse_table(str(self.path), read_at_most(self.path, MOST_BYTES), design.unit_mm)
         if "time" in table.columns:
             raise InputError(
                 f"{self.path} has a column time, so it is a path in time already: give the "
-                "corners alone, such as those in the answer of explorer path --json"
+                "corners alone, such as those of explorer path --corners"
             )
         c = read_poses(table, design, start.rotation, self.at)
         return tuple(Pose.of(*each) for each in zip(c.positions, c.rotations, strict=True))
 
-    def _law(
-        self, design: Design, poses: Sequence[Pose], tool: Triple | None
-    ) -> TimeLaw | float | None:
+    def _law(self, design: Design, moves: StraightMoves) -> TimeLaw | float | None:
         """Return the time law that the options give, as `TimedPath` takes it."""
         if (self.speed is None) != (self.acceleration is None):
             raise InputError("--speed and --acceleration belong together: give both")
@@ -134,20 +104,14 @@ class Drives(options.JsonOptions, options.PathEndOptions):
             return self.duration
         if self.duration is not None:
             raise InputError("give either --duration, or --speed and --acceleration")
-        return law_at_speed(design, poses, self.speed, self.acceleration, tool=tool)
+        return law_at_speed(design, moves, self.speed, self.acceleration)
 
 
-def _drives_json(found: DrivesOfPath) -> dict[str, object]:
+def _drives_json(found: DrivesOfPath, written: Sequence[Path]) -> dict[str, object]:
     names = "peak_speed peak_force rms_force peak_power mean_power duration"
     return {
         **output.attributes(found, names),
         "binding": [each and each._asdict() for each in found.binding],
         "least_motor": found.least_motor._asdict(),
+        **({"file": written[0]} if written else {}),
     }
-
-
-def _drive_lines(found: DrivesOfPath, written: tuple[int, Path] | None) -> Iterator[str]:
-    yield output.heading(found.design)
-    yield from output.block_lines(drive_blocks(found))
-    if written is not None:
-        yield from ("", f"{written[0]} rows in {written[1]}")

@@ -12,7 +12,7 @@ import numpy as np
 
 from explorer.cli import options, output, values
 from explorer.errors import InputError
-from explorer.export.tables import trajectory_csv
+from explorer.export.tables import corners_csv, trajectory_csv
 from explorer.files.writing import check_writable
 from explorer.legs import moves
 from explorer.legs.clearance import PAIRS
@@ -182,6 +182,9 @@ class Path(options.JsonOptions, options.RadiiOptions, options.PathEndOptions):
     """File for the trajectory as CSV: time, joints and pose, and the tool's position with `--at
     tool`."""
 
+    corners: Annotated[File | None, values.hint("optional", "FILE.csv")] = None
+    """File for the corners of the path as CSV, for `explorer drives --path`."""
+
     def run(self) -> None:
         """Write the path."""
         design = self.with_radii(self.read_design())
@@ -191,8 +194,8 @@ class Path(options.JsonOptions, options.RadiiOptions, options.PathEndOptions):
             raise InputError(f"say where the path ends {options.END_OPTIONS}")
         if self.load is not None:
             options.check_has_limits(design)
-        if self.out is not None:
-            check_writable(self.out)
+        for file in filter(None, (self.out, self.corners)):
+            check_writable(file)
         try:
             path = planning.plan_path(
                 design, start, goal, seconds=self.seconds, tool=tool, load=self.load
@@ -204,16 +207,18 @@ class Path(options.JsonOptions, options.RadiiOptions, options.PathEndOptions):
         law = None
         if self.acceleration is not None:
             speed = self.speed or DEFAULT_SPEED * design.reach
-            law = law_at_speed(design, path.poses, speed, self.acceleration, tool=tool)
+            straight = moves.StraightMoves.along(path.poses, tool)
+            law = law_at_speed(design, straight, speed, self.acceleration)
         timed = trajectory(
             design, path.poses, speed=self.speed, samples=self.samples, tool=tool, law=law
         )
         loads = None
         if self.load is not None:
             loads = path_loads(design, path.poses, self.load, tool=tool)
-        files = {} if self.out is None else {self.out: trajectory_csv(timed).encode()}
+        texts = {self.corners: corners_csv(path.poses, tool), self.out: trajectory_csv(timed)}
+        files = {file: text.encode() for file, text in texts.items() if file is not None}
         written, errors = options.write_files(files)
-        out = next(iter(written), None)
+        out = self.out if self.out in written else None
         self.write(
             lambda: _path_json(path, timed, loads, out),
             _path_lines(design, path, timed, loads, out),

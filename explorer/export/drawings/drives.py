@@ -11,7 +11,7 @@ from explorer.export.drawings.markup import coordinate, drawing_text, element, p
 from explorer.export.drawings.slices import ruler
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import or_infinite
-from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.paths.drives import PLACES, Drives
 from explorer.singularity.colours import Rgb, css
@@ -28,54 +28,44 @@ _LOOKS: tuple[tuple[Rgb, str | None], ...] = (
     *((_LEGS[2], "5 3"), (_LEGS[2], None)),
     (_LEGS[3], None),
 )
-# Room beyond the values of an axis, as a share of their span, and the least jump of a force that is
-# drawn upright, as a share of the largest force.
-ROOM, JUMP = 0.06, 0.02
+# Room beyond the values of an axis, as a share of their span.
+ROOM = 0.06
 
 
 def time_charts(drives: Drives) -> Element:
     """Return speeds, forces and powers of the actuators over time, one below the other."""
-    drawn, pieces, top = _drawn(drives), [*_legend()], LEGEND
+    pieces, top = [*_legend()], LEGEND
     charts = (
-        ("speed (mm/s)", drives.speed),
-        ("force (N)", drives.force),
-        ("power (W)", drives.power),
+        ("speed (mm/s)", "", drives.speed),
+        ("force (N)", "", drives.force),
+        ("power (W)", "time (s)", drives.power),
     )
-    for title, values in charts:
-        is_last = title == charts[-1][0]
-        rows = values[drawn]
-        ends = _ends([*rows.min(axis=0), *rows.max(axis=0), 0.0])
-        curves = [np.stack([drives.time[drawn], row], axis=-1) for row in rows.T]
-        span = (0.0, drives.duration)
-        pieces += _chart(title, "time (s)" if is_last else "", span, ends, curves, top, HEIGHT)
+    for title, name, values in charts:
+        rows = _drawn(values)
+        curves = [np.stack([_drawn(drives.time), row], axis=-1) for row in rows.T]
+        across, up = (0.0, drives.duration), _ends([*rows.ravel(), 0.0])
+        pieces += _chart(title, name, across, up, curves, top, HEIGHT)
         top += ABOVE + HEIGHT
     return _svg(top + BELOW, "Speeds, forces and powers of the actuators over time", pieces)
 
 
 def force_speed_chart(drives: Drives) -> Element:
     """Return the forces of the actuators against their speeds, with the limits as a box."""
-    limits = drives.design.actuators
-    push, pull = limits.limits
-    speed = or_infinite(limits.speed_mm_s)
-    lows, highs = np.stack([-speed, -pull]), np.stack([speed, push])
-    both = np.stack([drives.speed, drives.force])[:, _drawn(drives)]
-    across, up = (
-        _ends([*each.min(axis=0), *each.max(axis=0), *low, *high])
-        for each, low, high in zip(both, lows, highs, strict=True)
-    )
-    corners = [np.clip(each, *np.transpose([across, up])[..., None]) for each in (lows, highs)]
-    boxes = {
-        (*low, *high) for low, high in zip(*(each.T.tolist() for each in corners), strict=True)
-    }
+    push, pull = drives.design.actuators.limits
+    speed = or_infinite(drives.design.actuators.speed_mm_s)
+    # Lowest and highest values of both axes, shape (2, 2, 6).
+    limits = np.array([[-speed, speed], [-pull, push]])
+    both = np.stack([_drawn(drives.speed), _drawn(drives.force)])
+    across, up = (_ends([*b.ravel(), *l.ravel()]) for b, l in zip(both, limits, strict=True))
     curves = [both[..., joint].T for joint in range(6)]
     pieces = [*_legend(), *_chart("force (N)", "speed (mm/s)", across, up, curves, LEGEND, TALL)]
-    has_limits = np.isfinite([lows, highs]).any()
-    for x0, y0, x1, y1 in boxes if has_limits else ():
-        (left, low), (right, high) = _place(
-            np.array([(x0, y0), (x1, y1)]), across, up, LEGEND + ABOVE, TALL
-        ).tolist()
-        size = {"width": right - left, "height": low - high}
-        pieces.append(element("rect", x=left, y=high, **size, class_="limit"))
+    # A side without a limit lies at the end of its axis.
+    sides = np.clip(limits, *np.transpose([across, up])[..., None, None])
+    boxes = np.unique(sides.reshape(4, 6), axis=1).T if np.isfinite(limits).any() else ()
+    for x0, x1, y0, y1 in boxes:
+        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+        path = path_of(_place(corners, across, up, LEGEND + ABOVE, TALL), "Z")
+        pieces.append(element("path", d=path, class_="limit"))
     words = "Forces of the actuators against their speeds"
     return _svg(LEGEND + ABOVE + TALL + BELOW, words, pieces)
 
@@ -91,12 +81,9 @@ def _svg(height: float, title: str, pieces: Iterable[Element]) -> Element:
     )
 
 
-def _drawn(drives: Drives) -> IntArray:
-    """Return which samples are drawn: the starts of all intervals, and the ends before a jump."""
-    last, start = len(PLACES) - 1, np.arange(0, len(drives.time), len(PLACES))
-    jumps = np.abs(drives.force[start[1:]] - drives.force[start[:-1] + last]).max(axis=1)
-    ends = start[:-1][jumps > JUMP * drives.peak_force.max()] + last
-    return np.sort(np.concatenate([start, ends, [len(drives.time) - 1]]))
+def _drawn(values: FloatArray) -> FloatArray:
+    """Return those of values (n, ...) that are drawn: the first of each interval, and the last."""
+    return np.concatenate([values[:: len(PLACES)], values[-1:]])
 
 
 def _ends(values: Iterable[float]) -> tuple[float, float]:
