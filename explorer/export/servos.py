@@ -22,7 +22,7 @@ from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.prototype.chains import BODIES, Chains
-from explorer.prototype.weights import Mass, machine_weights, with_payload
+from explorer.prototype.weights import Mass, moving_bodies, with_payload
 from explorer.statics.compliance import softness_with_struts
 from explorer.statics.forces import actuator_forces, twists_of_actuators
 from explorer.statics.weights import carry
@@ -128,7 +128,7 @@ def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> S
     """
     inertia = np.diag(joint_inertia(design, with_payload(design, masses)))
     home = design.home_pose
-    wrench = carry(Configuration.at(design, home), machine_weights(design, masses)).wrench
+    wrench = carry(Configuration.at(design, home), moving_bodies(design, masses)).wrench
     weights = actuator_forces(design, home.position, home.rotation, wrench)
     stiffness = servo_stiffness(design) if elastic else None
     forces = weights if stiffness is None else np.zeros(6)

@@ -30,7 +30,7 @@ from explorer.statics.reactions import (
     limit_shares,
     reactions,
 )
-from explorer.statics.weights import design_weights, payload_wrench
+from explorer.statics.weights import MovingBodies, payload_wrench
 from explorer.workspace.least_clearance import node_measures
 
 BOX_NODES = 9
@@ -134,7 +134,7 @@ class BoxStatics:
     @cached_property
     def reactions(self) -> Reactions:
         """The reactions to the weight of the payload."""
-        return reactions(self.configuration, np.zeros(6), design_weights(self.design))
+        return reactions(self.configuration, np.zeros(6), MovingBodies().with_payload(self.design))
 
     @cached_property
     def errors(self) -> ToolError:

@@ -23,7 +23,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.time_law import JointMotion, TimeLaw
-from explorer.statics.motion import MovingBodies
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import violations
 

@@ -30,12 +30,8 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.statics.forces import forces_of
-from explorer.statics.motion import (
-    MovingBodies,
-    carry_motion,
-    joint_accelerations,
-    joint_rates,
-)
+from explorer.statics.motion import joint_accelerations, joint_rates
+from explorer.statics.weights import MovingBodies, carry
 
 DEFAULT_POINTS = 200
 # Least intervals of a move, and parts of an interval in which limits are checked.
@@ -127,7 +123,7 @@ class JointMotion(NamedTuple):
         place, rest = (design, c.position, c.rotation), np.zeros(6)
         twist, bend = moves.slopes(number, c.rotation)
         held, with_u, with_x = (
-            forces_of(c, carry_motion(c, *motion, bodies).wrench)
+            forces_of(c, carry(c, bodies, *motion).wrench)
             for motion in ((rest, rest), (rest, twist), (twist, bend))
         )
         if not np.isfinite(held).all():

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
@@ -17,22 +15,9 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.drives import Drives, check_limits
 from explorer.paths.time_law import TimeLaw, law_at_speed, law_of_shortest_time
-from explorer.prototype.chains import LEGS, ON_GUIDE, Chains
-from explorer.prototype.weights import DENSITY, Mass, bar_masses, with_payload
+from explorer.prototype.weights import DENSITY, Mass, bar_masses, moving_bodies
 from explorer.statics.forces import forces_of
-from explorer.statics.motion import (
-    AXIS_X,
-    CROSS,
-    MOMENT,
-    ROD,
-    ROD_CENTRE,
-    SIDE_X,
-    SIDE_Y,
-    SPIN,
-    TOTAL,
-    MovingBodies,
-    carry_motion,
-)
+from explorer.statics.weights import MovingBodies, carry
 
 
 def inverse_dynamics(
@@ -48,8 +33,8 @@ def inverse_dynamics(
     """Return the forces of the actuators in a motion, shape (..., 6), in newtons.
 
     They hold the weights and accelerate the masses; f > 0 pushes its joint's value up. All six are
-    infinite in a singular pose. `carry_motion` with `moving_bodies` has the same for `reactions`,
-    which also tells the bending of the struts and what the guide bears.
+    infinite in a singular pose. `carry` with `moving_bodies` has the same for `reactions`, which
+    also tells the bending of the struts and what the guide bears.
 
     Args:
         design: The manipulator, with its payload and its direction of gravity.
@@ -58,18 +43,25 @@ def inverse_dynamics(
         twist: Velocity of b4 and angular velocity (v; ω), base axes, shape (..., 6), in design
             units and radians per second.
         acceleration: Their rates (v̇; ω̇), shape (..., 6), in design units and radians per s².
-        legs: Whether the legs have their masses; else those of platform and payload count alone.
+        legs: Whether the bodies of the prototype have their masses; else the payload of the design,
+            which then stands for platform and tool too, counts alone.
         masses: Masses of the bodies, see `moving_bodies`; of bars as in the exported simulation if
             None.
 
     Raises:
-        InputError: A number is not finite, the rotation is not one, or batch axes do not broadcast.
+        InputError: A number is not finite, the rotation is not one, batch axes do not broadcast, or
+            nothing on the platform has a mass.
     """
+    bodies = MovingBodies().with_payload(design)
+    if legs:
+        bodies = moving_bodies(design, masses or bar_masses(design, DENSITY))
+    if not bodies.platform[3][3] > 0.0:
+        raise InputError(
+            "the platform has no mass, so that no motion asks a force for it: give the payload of "
+            "the design a mass, or the platform one of its own"
+        )
     c = Configuration(design, position, rotation)
-    bodies = _bars(design) if masses is None else moving_bodies(design, masses)
-    if not legs:
-        bodies = bodies.without_legs()
-    return forces_of(c, carry_motion(c, twist, acceleration, bodies).wrench)
+    return forces_of(c, carry(c, bodies, twist, acceleration).wrench)
 
 
 class TimedPath(NamedTuple):
@@ -107,53 +99,3 @@ def drives_along(design: Design, path: TimedPath) -> Drives:
     elif not isinstance(law, TimeLaw):
         law = law_at_speed(design, moves).lasting(law)
     return Drives.along(design, moves, law, bodies)
-
-
-@lru_cache(16)
-def _bars(design: Design) -> MovingBodies:
-    return moving_bodies(design, bar_masses(design, DENSITY))
-
-
-def moving_bodies(design: Design, masses: Mapping[str, Mass]) -> MovingBodies:
-    """Return the masses that a motion moves, those of bodies and the design's payload.
-
-    The masses of the bodies are in their own frames, in metres and kilograms, such as
-    `bar_masses` or `explorer.prototype.assembly.Prototype.masses`. Cylinders and rods have their
-    centres on their axes, and principal axes along those of their frames; the centre of a cross is
-    at its joint.
-
-    Raises:
-        InputError: Neither the platform nor the payload has a mass.
-    """
-    if not masses["platform"].mass + design.payload.mass_kg > 0.0:
-        raise InputError(
-            "the platform has no mass, so that no motion asks a force for it: give it a density, "
-            "or the design a payload"
-        )
-    metres = 1e-3 * design.unit_mm
-    platform = with_payload(design, masses)["platform"]
-    off = platform.centre
-    carried = np.empty((4, 4))
-    carried[:3, :3] = platform.inertia + platform.mass * (
-        off @ off * np.eye(3) - np.outer(off, off)
-    )
-    carried[:3, :3] /= metres
-    carried[:3, 3] = carried[3, :3] = platform.mass * off
-    carried[3, 3] = metres * platform.mass
-    axes = Chains.of(design).mounts[:, :, 0]
-    rows = np.zeros((4, 11))
-    for leg, row, axis in zip(LEGS, rows, axes, strict=True):
-        cylinder, rod = masses[f"cylinder {leg}"], masses[f"rod {leg}"]
-        first = masses[f"{'carriage' if leg in ON_GUIDE else 'cross'} {leg}"]
-        height, of_both = float(cylinder.centre[2]), np.diag(cylinder.inertia + rod.inertia)
-        row[TOTAL] = metres * (cylinder.mass + rod.mass)
-        if leg in ON_GUIDE:
-            row[TOTAL] += metres * first.mass
-        else:
-            row[CROSS] = first.inertia[0, 0] / metres
-        row[ROD], row[ROD_CENTRE] = metres * rod.mass, -rod.centre[2] / metres
-        row[MOMENT] = cylinder.mass * height
-        row[SIDE_X : SPIN + 1] = of_both / metres
-        row[SIDE_X : SIDE_Y + 1] += cylinder.mass * height**2 / metres
-        row[AXIS_X:] = axis
-    return MovingBodies(carried, rows)

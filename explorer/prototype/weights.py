@@ -7,7 +7,7 @@ tight for its parts. Units are those of the lengths and the density given.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Payload
-from explorer.mechanism.pose import Quadruple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
-from explorer.statics.weights import Weights
+from explorer.statics.weights import (
+    AXIS_X,
+    CROSS,
+    MOMENT,
+    ROD as ROD_MASS,
+    ROD_CENTRE,
+    SIDE_X,
+    SIDE_Y,
+    SPIN,
+    TOTAL,
+    MovingBodies,
+)
 
 
 @dataclass(frozen=True)
@@ -100,29 +109,37 @@ def with_payload(design: Design, masses: Mapping[str, Mass]) -> Mapping[str, Mas
     return {**masses, "platform": total_mass([masses["platform"], payload])}
 
 
-def machine_weights(design: Design, masses: Mapping[str, Mass], *, payload: bool = True) -> Weights:
-    """Return the weights of bodies and, unless it is left out, of the design's payload.
+def moving_bodies(
+    design: Design, masses: Mapping[str, Mass], *, payload: bool = True
+) -> MovingBodies:
+    """Return the masses of bodies and, unless it is left out, of the design's payload.
 
     The masses of the bodies are in their own frames, in metres and kilograms, such as
-    `explorer.prototype.assembly.Prototype.masses`.
+    `explorer.prototype.assembly.Prototype.masses`. Cylinders and rods have their centres on their
+    axes, and principal axes along those of their frames; the centre of a cross is at its joint.
     """
-    units = 1e3 / design.unit_mm
-    x, y, z = (units * masses["platform"].centre).tolist()
-    carried = (design.payload,) if payload else ()
-
-    def of_legs(kind: str, value: Callable[[Mass], float]) -> Quadruple:
-        a, b, c, d = (value(masses[f"{kind} {leg}"]) for leg in LEGS)
-        return a, b, c, d
-
-    two, three = (masses[f"carriage {leg}"].mass for leg in ON_GUIDE)
-    return Weights(
-        on_platform=(*carried, Payload(masses["platform"].mass, (x, y, z))),
-        carriages=(0.0, two, three, 0.0),
-        cylinders=of_legs("cylinder", lambda each: each.mass),
-        cylinder_centres=of_legs("cylinder", lambda each: units * float(each.centre[2])),
-        rods=of_legs("rod", lambda each: each.mass),
-        rod_centres=of_legs("rod", lambda each: -units * float(each.centre[2])),
+    metres = 1e-3 * design.unit_mm
+    axes = Chains.of(design).mounts[:, :, 0]
+    rows = np.zeros((4, 11))
+    for leg, row, axis in zip(LEGS, rows, axes, strict=True):
+        cylinder, rod = masses[f"cylinder {leg}"], masses[f"rod {leg}"]
+        first = masses[f"{'carriage' if leg in ON_GUIDE else 'cross'} {leg}"]
+        height, of_both = float(cylinder.centre[2]), np.diag(cylinder.inertia + rod.inertia)
+        row[TOTAL] = cylinder.mass + rod.mass
+        if leg in ON_GUIDE:
+            row[TOTAL] += first.mass
+        else:
+            row[CROSS] = first.inertia[0, 0] / metres**2
+        row[ROD_MASS], row[ROD_CENTRE] = rod.mass, -rod.centre[2] / metres
+        row[MOMENT] = cylinder.mass * height / metres
+        row[SIDE_X : SPIN + 1] = of_both / metres**2
+        row[SIDE_X : SIDE_Y + 1] += cylinder.mass * (height / metres) ** 2
+        row[AXIS_X:] = axis
+    own = masses["platform"]
+    bodies = MovingBodies.of_legs(rows).with_mass(
+        own.mass, own.centre / metres, own.inertia / metres**2
     )
+    return bodies.with_payload(design) if payload else bodies
 
 
 def bar_masses(design: Design, density: float) -> Mapping[str, Mass]:

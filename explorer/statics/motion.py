@@ -1,72 +1,21 @@
-"""Motion: rates and accelerations of the joints, and what moving masses ask of the actuators.
+"""Rates and accelerations of the joints in a motion of the platform, in closed form.
 
 A motion is a twist (v; ω) and an acceleration (v̇; ω̇) of b4 and the platform along the axes of the
 base, in design units, radians and seconds. For a leg of length l with the direction s, at whose end
 the platform has the velocity v and the acceleration a, l̇ = s·v and l̈ = s·a + |v − l̇ s|² / l. Legs
 2 and 3 do so across the guide, and along it d̈ = a_x.
-
-By d'Alembert's principle a body whose centre accelerates by a has the weight m (g − a) and the
-moment of its inertia, so that a motion is one more case of `explorer.statics.weights.Carried`:
-`explorer.statics.reactions.reactions` tells forces, bending and what the guide bears. A leg's
-motion follows from that of its end: its universal joint turns about one axis that the base holds
-and one across that and the leg, so that a leg that swings also spins. By virtual work its inertia
-acts on the actuators like one force at its end.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTH_ROWS, Design
-from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.points import ACROSS
-from explorer.numerics.arrays import FloatArray, dot, finite_array, rotate
-from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.vectors import Vector, along, column, cross3, dot3, norm3, times, vector
-from explorer.statics.forces import A3X, A3Y
-from explorer.statics.weights import ON_GUIDE, Carried
-
-FASTEST = 1e20
-"""Largest entry of a twist or an acceleration, far below what makes forces overflow."""
-
-# Columns of the rows of the legs, see `MovingBodies`.
-TOTAL, ROD, ROD_CENTRE, MOMENT, SIDE_X, SIDE_Y, SPIN, CROSS, AXIS_X, AXIS_Y, AXIS_Z = range(11)
-
-
-@dataclass(frozen=True)
-class MovingBodies:
-    """The masses that a motion moves, as the compiled code takes them.
-
-    All are in design units, with masses times the metres in a unit, so that mass × acceleration in
-    units/s² is newtons.
-
-    Attributes:
-        platform: Of the platform with all that it carries, in its frame, shape (4, 4): its inertia
-            about b4 in the first three rows and columns, mass × centre in the last column and row,
-            and its mass where they meet.
-        legs: Of each leg, shape (4, 11): its mass, the carriage's included; mass of its rod and
-            distance of the rod's centre back from the platform joint; mass of its cylinder times
-            the distance of its centre from the base joint; inertia of cylinder and rod about the
-            two axes across the leg, of the cylinder about the base joint, of the rod about its
-            centre; inertia of both about the leg; inertia of the cross about the axis that the base
-            holds; and this axis in the base frame.
-    """
-
-    platform: FloatArray
-    legs: FloatArray
-
-    def without_legs(self) -> MovingBodies:
-        """Return these bodies with legs that have no mass."""
-        return replace(self, legs=np.zeros(self.legs.shape))
-
-
-def motion_array(name: str, value: ArrayLike) -> FloatArray:
-    """Return a twist or an acceleration (..., 6) as float64 after checking it."""
-    return finite_array(f"the {name} (X Y Z, then turning)", value, (6,), FASTEST)
+from explorer.numerics.arrays import FloatArray, dot, rotate
+from explorer.statics.weights import ON_GUIDE, motion_array
 
 
 def joint_rates(
@@ -116,170 +65,3 @@ def joint_accelerations(
     centripetal = np.divide(squares, lengths, out=np.zeros(squares.shape), where=lengths > 0.0)
     result[..., LENGTH_ROWS] = dot(c.leg_directions, out) + centripetal
     return result
-
-
-@helper
-def combine(shares: Vector, x: Vector, y: Vector, z: Vector) -> Vector:
-    """Return the sum of three vectors with shares."""
-    return along(along(along((0.0, 0.0, 0.0), shares[0], x), shares[1], y), shares[2], z)
-
-
-@helper
-def acceleration_of(a: Vector, turning: Vector, turning_rate: Vector, arm: Vector) -> Vector:
-    """Return the acceleration of a point of a body at an arm from one with the acceleration a."""
-    swing = cross3(turning, arm)
-    return along(along(a, 1.0, cross3(turning_rate, arm)), 1.0, cross3(turning, swing))
-
-
-@helper
-def leg_inertia(
-    leg: Vector, v: Vector, a: Vector, g: Vector, on_guide: bool, m: FloatArray
-) -> tuple[Vector, Vector, float]:
-    """Return what a leg's weight and inertia do, given its vector and the motion of its end.
-
-    Returns:
-        The force at its end that stands for them, their sum, and the moment by which they change
-        that of the force of its carriage, in N and N × unit.
-    """
-    slide, first = 0.0, (m[AXIS_X], m[AXIS_Y], m[AXIS_Z])
-    if on_guide:
-        slide = a[0]
-        leg, v, a = (0.0, leg[1], leg[2]), (0.0, v[1], v[2]), (0.0, a[1], a[2])
-    length = norm3(leg)
-    if length == 0.0:
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
-    n, total = m[ROD], m[TOTAL]
-    s = along((0.0, 0.0, 0.0), 1.0 / length, leg)
-    # The leg's frame (x, y, s): y is the second axis of the universal joint. Along the first axis
-    # that is undefined, and the spin is taken as zero.
-    y, cosine = cross3(s, first), dot3(s, first)
-    sine = norm3(y)
-    if sine > 0.0:
-        y = along((0.0, 0.0, 0.0), 1.0 / sine, y)
-    else:
-        y, cosine, sine = (0.0, 0.0, 1.0), 0.0, 1.0
-    x, tangent = cross3(y, s), cosine / sine
-    # Angular velocity and acceleration, in this frame.
-    rate = dot3(s, v)
-    wx, wy = -dot3(y, v) / length, dot3(x, v) / length
-    wz = tangent * wx
-    square = wx * wx + wy * wy
-    ax = -(dot3(y, a) + 2.0 * rate * wx) / length + wy * wz
-    ay = (dot3(x, a) - 2.0 * rate * wy) / length - wx * wz
-    cross_rate = (ax + wy * wz) / sine
-    az = cosine * cross_rate + wx * wy
-    # Euler's equations of cylinder and rod about the base joint.
-    back = length - m[ROD_CENTRE]
-    moment = m[MOMENT] + n * back
-    ix, iy, iz = m[SIDE_X] + n * back * back, m[SIDE_Y] + n * back * back, m[SPIN]
-    # The rod goes farther out, so that the inertia about the base joint grows at this rate.
-    growth = 2.0 * n * back * rate
-    tx = ix * ax + growth * wx + (iz - iy) * wy * wz + moment * dot3(y, g)
-    ty = iy * ay + growth * wy + (ix - iz) * wx * wz - moment * dot3(x, g)
-    tz = iz * az + (iy - ix) * wx * wy
-    about_first = tx + tangent * tz + m[CROSS] * cross_rate / sine
-    rate_change = dot3(s, a) + length * square
-    along_leg = n * (rate_change - back * square - dot3(s, g))
-    across = total * (slide - g[0]) if on_guide else ty / length
-    at_end = combine((-across, about_first / length, -along_leg), x, y, s)
-    # The sum of mass × acceleration is n a + swinging · l s̈, with l s̈ = a − l̈ s − 2 l̇ ṡ.
-    swinging = (m[MOMENT] - n * m[ROD_CENTRE]) / length
-    swing = along(a, -1.0, combine((2.0 * rate * wy, -2.0 * rate * wx, rate_change), x, y, s))
-    total_force = combine((total, -n, -swinging), g, a, swing)
-    total_force = (total_force[0] - total * slide, total_force[1], total_force[2])
-    return at_end, total_force, (g[0] - slide) * (total * length - moment)
-
-
-@kernel(
-    "void(f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], "
-    "f8[:,::1], f8[:,::1])"
-)
-def inertia_rows(
-    variables: FloatArray,
-    points: FloatArray,
-    gravity: FloatArray,
-    platform: FloatArray,
-    legs: FloatArray,
-    position: FloatArray,
-    rotation: FloatArray,
-    twists: FloatArray,
-    accelerations: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Write what weight and inertia do in n motions, shape (n, 32).
-
-    It is that of `Carried`: the wrench, but at b4, at the joints, along the guide, and of the legs.
-    """
-    g = (gravity[0], gravity[1], gravity[2])
-    mass = platform[3, 3]
-    for k in range(position.shape[0]):
-        r, p = rotation[k], vector(position, k)
-        t, rate = twists[k % twists.shape[0]], accelerations[k % accelerations.shape[0]]
-        v, turning = (t[0], t[1], t[2]), (t[3], t[4], t[5])
-        a, turning_rate = (rate[0], rate[1], rate[2]), (rate[3], rate[4], rate[5])
-        x, y, z = column(r, 0), column(r, 1), column(r, 2)
-        # The platform turns in its own frame, in which its inertia does not change.
-        own = (dot3(x, turning), dot3(y, turning), dot3(z, turning))
-        own_rate = (dot3(x, turning_rate), dot3(y, turning_rate), dot3(z, turning_rate))
-        i, j, h = column(platform, 0), column(platform, 1), column(platform, 2)
-        torque = along(combine(own_rate, i, j, h), 1.0, cross3(own, combine(own, i, j, h)))
-        # Mass × centre from b4, and mass × the acceleration of the centre beyond that of b4.
-        first_moment = combine(column(platform, 3), x, y, z)
-        inwards = acceleration_of((0.0, 0.0, 0.0), turning, turning_rate, first_moment)
-        from_b4 = along(g, -1.0, a)
-        force = along((-inwards[0], -inwards[1], -inwards[2]), mass, from_b4)
-        moment = along(cross3(first_moment, from_b4), -1.0, combine(torque, x, y, z))
-        for leg in range(4):
-            arm, on_guide = times(r, points[leg]), 0 < leg < 3
-            end = along(p, 1.0, arm)
-            if leg == 3:
-                end = (end[0] - variables[A3X], end[1] - variables[A3Y], end[2])
-            end_v = along(v, 1.0, cross3(turning, arm))
-            end_a = acceleration_of(a, turning, turning_rate, arm)
-            at_end, total, on_carriage = leg_inertia(end, end_v, end_a, g, on_guide, legs[leg])
-            force, moment = along(force, 1.0, at_end), along(moment, 1.0, cross3(arm, at_end))
-            if on_guide:
-                out[k, 17 + leg] = on_carriage
-            for axis in range(3):
-                out[k, 6 + 3 * leg + axis], out[k, 20 + 3 * leg + axis] = at_end[axis], total[axis]
-        for axis in range(3):
-            out[k, axis], out[k, 3 + axis] = force[axis], moment[axis]
-
-
-def carry_motion(
-    configuration: Configuration,
-    twist: ArrayLike,
-    acceleration: ArrayLike,
-    bodies: MovingBodies,
-) -> Carried:
-    """Return what weight and inertia of bodies do in a motion, for `reactions` and `forces_of`.
-
-    The twist and the acceleration are those of `joint_accelerations`, of b4 whatever the tool of
-    the configuration. Where a leg lies along the first axis of its universal joint, its spin is
-    undefined and taken as zero.
-
-    Raises:
-        InputError: A number is not finite, or batch axes do not broadcast.
-    """
-    t, rate = motion_array("twist", twist), motion_array("acceleration", acceleration)
-    c = configuration.spread(t, rate)
-    out = np.empty((len(c.positions), 32))
-    inertia_rows(
-        len(out),
-        c.variables,
-        c.design.platform_points,
-        STANDARD_GRAVITY * 1e3 / c.design.unit_mm * np.array(c.design.gravity),
-        bodies.platform,
-        bodies.legs,
-        c.positions,
-        c.rotations,
-        c.rows_or_one(t),
-        c.rows_or_one(rate),
-        out,
-    )
-    out = out.reshape(*c.batch, 32)
-    wrench, along_guide = out[..., :6], out[..., 18:20]
-    if c.tool.any():
-        wrench[..., 3:] -= np.cross(c.arm, wrench[..., :3])
-    at_joints, of_legs = (out[..., i : i + 12].reshape(*c.batch, 4, 3) for i in (6, 20))
-    return Carried(wrench, at_joints, along_guide, of_legs)

@@ -9,11 +9,10 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
-from explorer.mechanism.machine import Payload
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
 from explorer.statics.forces import forces_of, twists_of_actuators
-from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry, design_weights
+from explorer.statics.weights import Carried, MovingBodies, carry
 
 LIMITED = (
     *JOINTS,
@@ -59,7 +58,7 @@ class Reactions(NamedTuple):
 
 
 def reactions(
-    configuration: Configuration, load: ArrayLike, weights: Weights | Carried | None = None
+    configuration: Configuration, load: ArrayLike, weights: MovingBodies | Carried | None = None
 ) -> Reactions:
     """Return all that holds a load and weights.
 
@@ -78,7 +77,7 @@ def reactions(
         InputError: The load is not finite, or batch axes do not broadcast.
     """
     known = isinstance(weights, Carried)
-    carried = weights if known else carry(configuration, weights or NO_WEIGHTS)
+    carried = weights if known else carry(configuration, weights or MovingBodies())
     forces = forces_of(configuration, carried.wrench + np.asarray(load, dtype=np.float64))
     signed = _signed(configuration, forces, carried)
     across = signed[..., 8:].reshape(*signed.shape[:-1], 2, 2)
@@ -134,7 +133,7 @@ def has_limits(design: Design) -> bool:
 def largest_payload(
     configuration: Configuration,
     load: ArrayLike = (0.0,) * 6,
-    weights: Weights | None = None,
+    weights: MovingBodies | None = None,
 ) -> FloatArray:
     """Return the largest mass at the payload's centre that keeps all limits, shape (...), in kg.
 
@@ -152,9 +151,8 @@ def largest_payload(
         InputError: The load is not finite, or batch axes do not broadcast.
     """
     design = configuration.design
-    base = carry(configuration, weights or NO_WEIGHTS)
-    one = Weights(on_platform=(Payload(1.0, design.payload.centre),))
-    kilogram = carry(configuration, one)
+    base = carry(configuration, weights or MovingBodies())
+    kilogram = carry(configuration, MovingBodies().with_mass(1.0, design.payload.centre))
     at_zero = forces_of(configuration, base.wrench + np.asarray(load, dtype=np.float64))
     by_one = forces_of(configuration, kilogram.wrench)
     regular = np.isfinite(at_zero[..., 0])
@@ -186,7 +184,7 @@ def largest_accelerations(configuration: Configuration) -> FloatArray:
     is not held at rest, −∞ in a singular pose, and infinite for a part without a limit.
     """
     design = configuration.design
-    held = reactions(configuration, np.zeros(6), design_weights(design))
+    held = reactions(configuration, np.zeros(6), MovingBodies().with_payload(design))
     values = np.concatenate([held.actuators, held.bending, held.guide_force], axis=-1)
     regular = np.isfinite(values)
     values = np.where(regular, values, 0.0)

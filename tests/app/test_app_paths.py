@@ -517,8 +517,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     PathRunner(services_for()).follow(Frame(state))
     _, task, arguments, *_ = orders[-1]
     poses = task(*arguments).poses
-    own = weights_of_parts((PRESS, 3000.0))
-    weights = replace(own, on_platform=(*own.on_platform, PRESS.payload))
+    weights = weights_of_parts((PRESS, 3000.0)).with_payload(PRESS)
     along = path_loads(PRESS, poses, state.load, tool=state.tool, weights=weights)
     assert 0.5 < along.share <= 1.0 + 1e-4
 

@@ -33,8 +33,7 @@ from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.compiled import warm
 from explorer.paths.time_law import DEFAULT_POINTS, law_of_shortest_time
-from explorer.prototype.dynamics import moving_bodies
-from explorer.prototype.weights import DENSITY, bar_masses
+from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies
 from explorer.statics.accuracy import (
     actuator_errors,
     error_by_source,

@@ -21,7 +21,7 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
 from explorer.prototype.dynamics import TimedPath, drives_along
 from explorer.statics.reactions import Reactions, limit_shares
-from explorer.statics.weights import design_weights
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.carried_region import carried_region
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -73,7 +73,7 @@ def loaded_page(seed: int) -> Node:
 
 def reactions_at_home(design: Design) -> Reactions:
     home = design.home_pose
-    weights = design_weights(design)
+    weights = MovingBodies().with_payload(design)
     tool = design.tool.position
     return explorer.reactions(explorer.Configuration.at(design, home, tool), ZERO, weights)
 

@@ -19,7 +19,7 @@ from explorer.numerics.number_text import Unit
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, stiffness_of
 from explorer.statics.reactions import largest_accelerations, limit_shares
-from explorer.statics.weights import design_weights, payload_wrench
+from explorer.statics.weights import MovingBodies, payload_wrench
 
 OPTIMAL = PRESETS["paper-optimal"]
 BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
@@ -46,7 +46,7 @@ def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
     rotation = PRECISE.home_pose.rotation
     positions = np.random.default_rng(1).uniform(*BOX, (1000, 3))
     given = PRECISE, positions, rotation
-    held = reactions(Configuration(*given), np.zeros(6), design_weights(PRECISE))
+    held = reactions(Configuration(*given), np.zeros(6), MovingBodies().with_payload(PRECISE))
     shares = limit_shares(PRECISE, held)
     poses = Configuration(*given, PRECISE.tool.position)
     soft = compliance_of(poses, *stiffness_of(PRECISE))

@@ -19,9 +19,8 @@ from explorer.numerics.arrays import triple
 from explorer.paths.drives import Drives, check_limits
 from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.prototype.chains import BODIES, Chains
-from explorer.prototype.dynamics import moving_bodies
-from explorer.prototype.weights import DENSITY, Mass, bar_masses, with_payload
-from explorer.statics.motion import MovingBodies
+from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies, with_payload
+from explorer.statics.weights import MovingBodies
 
 EMPTY = PRESETS["paper-optimal"]
 OPTIMAL = msgspec.structs.replace(EMPTY, payload=Payload(2.0, (1, 0, 1)))
@@ -105,9 +104,7 @@ def test_slower_law_has_slower_speeds_and_in_the_end_the_forces_at_rest() -> Non
 
 def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
     duration, mass = 0.5, 2.0
-    bodies = bodies_of(OPTIMAL).without_legs()
-    bodies.platform[:] = 0.0
-    bodies.platform[3, 3] = 1e-3 * OPTIMAL.unit_mm * mass
+    bodies = MovingBodies().with_mass(mass, (0.0, 0.0, 0.0))
     law = law_of_duration(ALONG_GUIDE, duration)
     found = Drives.along(OPTIMAL, StraightMoves.along(ALONG_GUIDE), law, bodies)
     way = OPTIMAL.unit_mm * WAY
@@ -137,10 +134,8 @@ def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
         assert speed == pytest.approx(found.peak_speed[joint])
 
 
-def test_path_without_length_or_mass_or_through_a_singular_pose_is_refused() -> None:
+def test_path_without_length_or_through_a_singular_pose_is_refused() -> None:
     assert "no length" in refusal(lambda: law_of_duration([HOME, HOME], 1.0))
-    massless = {**bar_masses(EMPTY, DENSITY), "platform": Mass(0.0, np.zeros(3), np.eye(3))}
-    assert "no mass" in refusal(lambda: moving_bodies(EMPTY, massless))
     assert "above zero" in refusal(law_of_duration, ALONG_GUIDE, math.nan)
     through = [HOME, Pose((X, Y, 0.0), HOME.quaternion)]
     with pytest.raises(NoAnswerError, match="singular"):

@@ -27,9 +27,8 @@ from explorer.mechanism.pose import Triple
 from explorer.paths import time_law
 from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.paths.trajectory import trajectory
-from explorer.prototype.dynamics import moving_bodies
-from explorer.prototype.weights import bar_masses
-from explorer.statics.motion import MovingBodies
+from explorer.prototype.weights import bar_masses, moving_bodies
+from explorer.statics.weights import MovingBodies
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose
@@ -191,10 +190,8 @@ def test_law_without_a_limit_or_a_mass_is_refused_in_a_sentence() -> None:
     fast = msgspec.structs.replace(OPTIMAL, actuators=Actuators(speed_mm_s=same_for_all(10.0)))
     assert "nothing limits" in refusal(lambda: law_of_shortest_time(fast, ALONG_GUIDE))
     strong = msgspec.structs.replace(OPTIMAL, actuators=Actuators(push_n=same_for_all(10.0)))
-    massless = bodies_of(strong).without_legs()
-    massless.platform[:] = 0.0
     moves = StraightMoves.along(ALONG_GUIDE)
-    words = refusal(time_law.law_of_shortest_time, strong, moves, massless)
+    words = refusal(time_law.law_of_shortest_time, strong, moves, MovingBodies())
     assert "masses to move" in words
     for speed, acceleration in ((0.0, 1.0), (1.0, -1.0), (1.0, math.nan)):
         words = refusal(law_at_speed, OPTIMAL, moves, speed, acceleration)

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from mujoco_models import OPTIMAL, engine, joints_of, loops_of, random_design
 from numpy.testing import assert_allclose
+from refusals import refusal
 from scipy.spatial.transform import Rotation
 from smooth_motion import Motion, derivatives, random_motions
-from statics_cases import random_poses
 
 from explorer import (
     Configuration,
     Design,
     Payload,
-    actuator_forces,
     inverse_dynamics,
+    jacobian,
     joint_rates,
     make_prototype,
     reactions,
@@ -29,9 +29,7 @@ from explorer.mechanism.design import DOWN
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED, BODIES, LEGS, ON_GUIDE, Chains
-from explorer.prototype.dynamics import moving_bodies
-from explorer.prototype.weights import DENSITY, Mass, bar_masses, machine_weights, with_payload
-from explorer.statics.motion import carry_motion
+from explorer.prototype.weights import DENSITY, Mass, bar_masses, moving_bodies, with_payload
 from explorer.statics.weights import carry
 
 DESIGNS = [msgspec.structs.replace(OPTIMAL, payload=Payload(0.5)), *map(random_design, range(9))]
@@ -67,21 +65,17 @@ def forces_of_model(design: Design, model: Any, motion: Motion) -> FloatArray:
 
 @pytest.mark.parametrize(
     ("index", "of"),
-    [*((index, "bars") for index in range(len(DESIGNS))), (0, "parts"), (0, "none"), (1, "none")],
+    [*((index, "bars") for index in range(len(DESIGNS))), (0, "parts")],
 )
 def test_inverse_dynamics_is_that_of_the_exported_model(index: int, of: str) -> None:
-    design, legs = DESIGNS[index], of != "none"
+    design = DESIGNS[index]
     masses = make_prototype(design).masses(DENSITY) if of == "parts" else None
     model = engine.MjModel.from_xml_string(simulation_mjcf(design, DENSITY, masses))
     model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
     # The rotors belong to the servos, not to the mechanism.
     model.dof_armature[:] = 0.0
-    if not legs:
-        for name in BODIES[1:-1]:
-            body = model.body(name.replace(" ", "_"))
-            body.mass[:], body.inertia[:] = 1e-12, 1e-12
     motions = random_motions(design, STATES, index, RATE)
-    found = inverse_dynamics(design, *motions, legs=legs, masses=masses)
+    found = inverse_dynamics(design, *motions, masses=masses)
     for forces, motion in zip(found, motions.each(), strict=True):
         expected = forces_of_model(design, model, motion)
         assert_allclose(forces, expected, atol=1e-6 * np.abs(expected).max())
@@ -115,7 +109,7 @@ def test_reactions_in_a_motion_keep_newtons_laws_of_every_leg(index: int) -> Non
     masses, metres = bar_masses(design, DENSITY), 1e-3 * design.unit_mm
     motions = random_motions(design, 5, 7, RATE)
     c = Configuration(design, *motions[:2], tool)
-    found = reactions(c, np.zeros(6), carry_motion(c, *motions[2:], moving_bodies(design, masses)))
+    found = reactions(c, np.zeros(6), carry(c, moving_bodies(design, masses), *motions[2:]))
     assert_allclose(found.actuators, inverse_dynamics(design, *motions), rtol=1e-9)
     size = np.abs(found.joints).max()
     for k, motion in enumerate(motions.each()):
@@ -202,14 +196,31 @@ def test_work_of_the_actuators_is_the_change_of_energy(index: int) -> None:
     assert_allclose(work, after - before, atol=1e-7 * np.abs(powers).max() * 1e-3 * design.unit_mm)
 
 
-@pytest.mark.parametrize("parts", [False, True], ids=["bars", "parts"])
-def test_inverse_dynamics_at_rest_is_statics(parts: bool) -> None:
-    design = msgspec.structs.replace(OPTIMAL, payload=Payload(0.7, (1.0, 2.0, -1.0)))
-    masses = make_prototype(design).masses(DENSITY) if parts else bar_masses(design, DENSITY)
-    poses, rest = random_poses(design, 50), np.zeros(6)
-    wrench = carry(Configuration(design, *poses), machine_weights(design, masses)).wrench
-    found = inverse_dynamics(design, *poses, rest, rest, masses=masses)
-    assert_allclose(found, actuator_forces(design, *poses, wrench), rtol=1e-12, atol=1e-12)
+@pytest.mark.parametrize("index", range(4))
+def test_without_bodies_of_the_prototype_the_payload_counts_in_closed_form(index: int) -> None:
+    payload = Payload(0.7, (1.0, 2.0, -1.0), inertia_kg_mm2=(300.0, 500.0, 400.0))
+    design = msgspec.structs.replace(DESIGNS[index], payload=payload)
+    metres, gravity = 1e-3 * design.unit_mm, STANDARD_GRAVITY * np.array(design.gravity)
+    motions = random_motions(design, 20, index, RATE)
+    found = inverse_dynamics(design, *motions, legs=False)
+    for forces, (position, rotation, twist, rate) in zip(found, motions.each(), strict=True):
+        arm, spin, change = metres * rotation @ payload.centre, twist[3:], rate[3:]
+        acceleration = metres * rate[:3] + np.cross(change, arm)
+        acceleration = acceleration + np.cross(spin, np.cross(spin, arm))
+        force = payload.mass_kg * (gravity - acceleration)
+        inertia = 1e-6 * rotation @ np.diag(payload.inertia_kg_mm2) @ rotation.T
+        moment = np.cross(arm, force) - inertia @ change - np.cross(spin, inertia @ spin)
+        wrench = np.array([*force, *moment / metres])
+        expected = -np.linalg.solve(jacobian(design, position, rotation).T, wrench)
+        assert_allclose(forces, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_platform_without_a_mass_is_refused() -> None:
+    motion = OPTIMAL.home_pose.position, OPTIMAL.home_pose.rotation, np.ones(6), np.ones(6)
+    design = msgspec.structs.replace(OPTIMAL, payload=Payload())
+    massless = {**bar_masses(design, DENSITY), "platform": Mass(0.0, np.zeros(3), np.eye(3))}
+    assert "no mass" in refusal(lambda: inverse_dynamics(design, *motion, legs=False))
+    assert "no mass" in refusal(lambda: inverse_dynamics(design, *motion, masses=massless))
 
 
 def test_inverse_dynamics_is_infinite_in_singular_poses_and_finite_along_a_first_axis() -> None:

@@ -14,15 +14,13 @@ from statics_cases import random_poses
 from explorer import Actuators, Configuration, Design, Guide, Payload, Struts, inverse_dynamics
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.dynamics import moving_bodies
-from explorer.prototype.weights import Mass, bar_masses
-from explorer.statics.motion import carry_motion
 from explorer.statics.reactions import (
     largest_accelerations,
     largest_payload,
     limit_shares,
     reactions,
 )
+from explorer.statics.weights import MovingBodies, carry
 
 REST = np.zeros(6)
 
@@ -40,11 +38,6 @@ def machine(seed: int) -> Design:
     )
 
 
-def only_payload(design: Design) -> dict[str, Mass]:
-    """Return bodies that weigh next to nothing beside the payload."""
-    return dict.fromkeys(bar_masses(design, 1.0), Mass(1e-14, np.zeros(3), np.zeros((3, 3))))
-
-
 def straight(accelerations: FloatArray, design: Design) -> FloatArray:
     """Return accelerations (n, 3) in m/s² as those of a platform that does not turn, (n, 6)."""
     return 1e3 / design.unit_mm * np.pad(accelerations, ((0, 0), (0, 3)))
@@ -59,7 +52,7 @@ def test_largest_acceleration_is_that_of_linear_programmes(seed: int) -> None:
     units = straight(np.vstack([np.zeros(3), np.eye(3)]), design)
     for pose in zip(*random_poses(design, 12), strict=True):
         radius = float(largest_accelerations(Configuration(design, *pose)).min())
-        forces = inverse_dynamics(design, *pose, REST, units, masses=only_payload(design))
+        forces = inverse_dynamics(design, *pose, REST, units, legs=False)
         rows = (forces[1:] - forces[0]).T
         sides, room = np.vstack([rows, -rows]), np.concatenate([push - forces[0], pull + forces[0]])
         lengths = np.linalg.norm(sides, axis=1)
@@ -79,13 +72,13 @@ def test_largest_acceleration_is_that_of_linear_programmes(seed: int) -> None:
 def test_accelerations_up_to_the_largest_keep_all_limits(seed: int) -> None:
     design, ways = machine(seed), np.random.default_rng(seed).normal(size=(20000, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    bodies = moving_bodies(design, only_payload(design))
+    bodies = MovingBodies().with_payload(design)
     for pose in zip(*random_poses(design, 12), strict=True):
         c = Configuration(design, *pose, design.tool.position)
         radius = float(largest_accelerations(c).min())
         assert (radius >= 0.0) == (float(largest_payload(c)) >= design.payload.mass_kg)
         for factor in (0.999, 1.02):
-            moving = carry_motion(c, REST, straight(factor * radius * ways, design), bodies)
+            moving = carry(c, bodies, REST, straight(factor * radius * ways, design))
             worst = float(limit_shares(design, reactions(c, REST, moving)).max())
             assert (worst <= 1.0) == (radius > 0.0 and factor < 1.0), (radius, factor, worst)
 

@@ -17,7 +17,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.prototype.chains import ACTUATED
-from explorer.prototype.weights import bar_masses, machine_weights
+from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics.weights import carry
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -50,7 +50,7 @@ def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design)
     model = engine.MjModel.from_xml_string(simulation_mjcf(design))
     # Gravity is that of the scene, MuJoCo's own 9.81 m/s².
     model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
-    weights = machine_weights(design, bar_masses(design, DENSITY))
+    weights = moving_bodies(design, bar_masses(design, DENSITY))
     data = engine.MjData(model)
     positions, rotations = random_poses(design, 10, seed=2)
     for position, rotation in zip(positions, rotations, strict=True):

@@ -56,7 +56,9 @@ def force_speed_chart(drives: Drives) -> Element:
     # Lowest and highest values of both axes, shape (2, 2, 6).
     limits = np.array([[-speed, speed], [-pull, push]])
     both = np.stack([_drawn(drives.speed), _drawn(drives.force)])
-    across, up = (_ends([*b.ravel(), *l.ravel()]) for b, l in zip(both, limits, strict=True))
+    across, up = (
+        _ends([*values.ravel(), *most.ravel()]) for values, most in zip(both, limits, strict=True)
+    )
     curves = [both[..., joint].T for joint in range(6)]
     pieces = [*_legend(), *_chart("force (N)", "speed (mm/s)", across, up, curves, LEGEND, TALL)]
     # A side without a limit lies at the end of its axis.
