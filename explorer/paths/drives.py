@@ -8,10 +8,10 @@ because most drives turn the power of a brake into heat.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,10 +26,6 @@ from explorer.paths.time_law import JointMotion, TimeLaw
 from explorer.statics.weights import MovingBodies
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import violations
-
-LimitName = Literal["speed", "acceleration", "push", "pull", "continuous force"]
-LIMITS: tuple[LimitName, ...] = ("speed", "acceleration", "push", "pull")
-"""Limits that a motion uses at a time; that of the continuous force holds for the whole motion."""
 
 # Share of a limit from which it counts as exceeded, rather than used up to rounding.
 BEYOND = 1.0 + 1e-6
@@ -46,18 +42,27 @@ class Binding(NamedTuple):
         time: Time of the largest share in seconds; None for the continuous force.
     """
 
-    limit: LimitName
+    limit: str
     share: float
     time: float | None
 
 
-class LeastMotor(NamedTuple):
-    """Peak and continuous force in N, speed in mm/s and power in W that the six need at least."""
+class Figures(NamedTuple):
+    """Numbers of the six actuators along a path, each of shape (6,).
 
-    peak_force: float
-    continuous_force: float
-    speed: float
-    power: float
+    Attributes:
+        peak_speed: Largest speeds to either side, in mm/s.
+        peak_force: Largest forces to either side, in N.
+        rms_force: Root-mean-square forces, in N.
+        peak_power: Largest powers, driving or braking, in W.
+        mean_power: Means of the size of the power, in W.
+    """
+
+    peak_speed: FloatArray
+    peak_force: FloatArray
+    rms_force: FloatArray
+    peak_power: FloatArray
+    mean_power: FloatArray
 
 
 @dataclass(frozen=True)
@@ -90,14 +95,8 @@ class Drives:
         """
         if not law.duration > 0.0:
             raise InputError("the path has no length: all its poses are the same")
-        steps = np.diff(law.time)
-        moving = steps > 0.0
-        time = (law.time[:-1][moving, None] + steps[moving, None] * np.array(PLACES)).ravel()
-        at, rate, change = law.places(time)
-        # The move of an interval, by its middle: to rounding its ends may be in another one.
-        middle = 0.5 * (law.at[:-1] + law.at[1:])[moving]
-        number = np.repeat(middle.astype(np.int64), len(PLACES))
-        motion = JointMotion.along(design, moves, number, at - number, bodies)
+        time, number, share, rate, change = law.within_intervals(PLACES)
+        motion = JointMotion.along(design, moves, number, share, bodies)
         u, x = change[:, None], rate[:, None] ** 2
         speed = design.unit_mm * rate[:, None] * motion.slope
         acceleration = design.unit_mm * (u * motion.slope + x * motion.bend)
@@ -105,79 +104,50 @@ class Drives:
         return Drives(design, law, time, speed, acceleration, force)
 
     @property
-    def duration(self) -> float:
-        """Duration in seconds."""
-        return self.law.duration
-
-    @property
     def power(self) -> FloatArray:
         """Mechanical powers of the actuators in W, below zero while they brake, shape (n, 6)."""
         return 1e-3 * self.force * self.speed
 
-    @property
-    def peak_speed(self) -> FloatArray:
-        """Largest speed of each actuator to either side in mm/s, shape (6,)."""
-        return np.abs(self.speed).max(axis=0)
-
-    @property
-    def peak_force(self) -> FloatArray:
-        """Largest force of each actuator to either side in N, shape (6,)."""
-        return np.abs(self.force).max(axis=0)
-
     @cached_property
-    def rms_force(self) -> FloatArray:
-        """Root-mean-square force of each actuator in N, shape (6,)."""
-        return np.sqrt(self.mean(self.force**2))
+    def figures(self) -> Figures:
+        """Peaks and means of each actuator."""
+        speed, force, power = (np.abs(each) for each in (self.speed, self.force, self.power))
+        rms_force, mean_power = np.sqrt(self.mean(force**2)), self.mean(power)
+        peaks = (each.max(axis=0) for each in (speed, force, power))
+        return Figures(next(peaks), next(peaks), rms_force, next(peaks), mean_power)
 
     @property
-    def peak_power(self) -> FloatArray:
-        """Largest power of each actuator, driving or braking, in W, shape (6,)."""
-        return np.abs(self.power).max(axis=0)
-
-    @property
-    def mean_power(self) -> FloatArray:
-        """Mean of the size of each actuator's power in W, shape (6,)."""
-        return self.mean(np.abs(self.power))
+    def least_motor(self) -> Mapping[str, float]:
+        """The least that one motor for all six has to hold: the largest of each of the figures."""
+        return {name: float(six.max()) for name, six in self.figures._asdict().items()}
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Return means over time of values at the times, of shape (n, ...)."""
         intervals = np.diff(self.law.time)
         weights = np.outer(intervals[intervals > 0.0], WEIGHTS).ravel()
-        return weights @ values / self.duration
+        return weights @ values / self.law.duration
 
     @cached_property
     def binding(self) -> tuple[Binding | None, ...]:
         """For each actuator the limit of which it uses the most; None for one without limits."""
-        limits = self.design.actuators
-        speed, acceleration, continuous = map(
-            or_infinite, (limits.speed_mm_s, limits.acceleration_mm_s2, limits.continuous_n)
-        )
-        push, pull = limits.limits
-        shares = np.stack(
-            [
-                np.abs(self.speed) / speed,
-                np.abs(self.acceleration) / acceleration,
-                self.force / push,
-                -self.force / pull,
-            ]
-        )
-        times = self.time[shares.argmax(axis=1)]
-        most, steady = shares.max(axis=1), self.rms_force / continuous
+        limits, (push, pull) = self.design.actuators, self.design.actuators.limits
+        shares = {
+            "speed": np.abs(self.speed) / or_infinite(limits.speed_mm_s),
+            "acceleration": np.abs(self.acceleration) / or_infinite(limits.acceleration_mm_s2),
+            "push": self.force / push,
+            "pull": -self.force / pull,
+            "continuous force": self.figures.rms_force[None] / or_infinite(limits.continuous_n),
+        }
         found: list[Binding | None] = []
         for joint in range(6):
-            used = [
-                *map(Binding, LIMITS, most[:, joint].tolist(), times[:, joint].tolist()),
-                Binding("continuous force", float(steady[joint]), None),
-            ]
-            largest = max(used, key=lambda each: each.share)
-            found.append(largest if largest.share > 0.0 else None)
+            name, used = max(
+                ((name, each[:, joint]) for name, each in shares.items()),
+                key=lambda named: float(named[1].max()),
+            )
+            time = float(self.time[used.argmax()]) if len(used) > 1 else None
+            share = float(used.max())
+            found.append(Binding(name, share, time) if share > 0.0 else None)
         return tuple(found)
-
-    @property
-    def least_motor(self) -> LeastMotor:
-        """The least that one motor for all six actuators has to hold."""
-        each = self.peak_force, self.rms_force, self.peak_speed, self.peak_power
-        return LeastMotor(*(float(six.max()) for six in each))
 
 
 def check_limits(design: Design, moves: StraightMoves) -> None:
@@ -203,25 +173,37 @@ def check_limits(design: Design, moves: StraightMoves) -> None:
 
 def drive_blocks(drives: Drives) -> Iterator[block.Block]:
     """Yield what a path asks of the actuators, and the least motor."""
-    motor, used = drives.least_motor, [*map(_binding_words, drives.binding)]
+    force, steady, power, speed = (
+        block.Number(drives.least_motor[name], f" {unit}")
+        for name, unit in (
+            ("peak_force", "N"),
+            ("rms_force", "N"),
+            ("peak_power", "W."),
+            ("peak_speed", "mm/s"),
+        )
+    )
+    words = ("A motor that holds all this needs at least ", force, " peak, ", steady)
     yield block.Statement(
         "Least motor",
-        (
-            *("A motor that holds all this needs at least ", block.Number(motor.peak_force, " N")),
-            *(" peak, ", block.Number(motor.continuous_force, " N"), " continuous, "),
-            *(block.Number(motor.speed, " mm/s"), " and ", block.Number(motor.power, " W.")),
-        ),
+        (*words, " continuous, ", speed, " and ", power),
         hint="The largest of the six actuators, in each number",
     )
+    used = [*map(_binding_words, drives.binding)]
+    columns = (
+        ("peak speed, mm/s", 4),
+        ("peak force, N", 4),
+        ("RMS force, N", 4),
+        ("peak power, W", 3),
+        ("mean power, W", 3),
+    )
     yield block.Table(
-        f"Actuators along the path, {drives.duration:.4g} s",
+        f"Actuators along the path, {drives.law.duration:.4g} s",
         (
             block.Names("actuator", JOINTS),
-            block.Column("peak speed, mm/s", drives.peak_speed.tolist(), digits=4),
-            block.Column("peak force, N", drives.peak_force.tolist(), digits=4),
-            block.Column("RMS force, N", drives.rms_force.tolist(), digits=4),
-            block.Column("peak power, W", drives.peak_power.tolist(), digits=3),
-            block.Column("mean power, W", drives.mean_power.tolist(), digits=3),
+            *(
+                block.Column(title, six.tolist(), digits=digits)
+                for (title, digits), six in zip(columns, drives.figures, strict=True)
+            ),
             *((block.Names("most used limit", used),) if any(drives.binding) else ()),
         ),
         "Mean power is the mean of its size: a brake's power counts too.",

@@ -21,6 +21,7 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.errors import InputError, NoAnswerError
 from explorer.files.extras import load_extra
@@ -85,11 +86,31 @@ class TimeLaw:
     def places(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return place, its rate and its second derivative at times (n,), each of shape (n,)."""
         index = np.clip(np.searchsorted(self.time, time, "right") - 1, 0, len(self.time) - 2)
-        since, rate = time - self.time[index], self.rate[index]
-        change = np.diff(self.rate**2) / (2.0 * np.diff(self.at))
-        at = self.at[index] + rate * since + 0.5 * change[index] * since**2
-        ends = self.at[index], self.at[index + 1]
-        return np.clip(at, *ends), rate + change[index] * since, change[index]
+        return self._places(index, time - self.time[index])
+
+    def within_intervals(
+        self, parts: ArrayLike
+    ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
+        """Return what the law is at parts of the intervals that take time, from 0 to below 1.
+
+        They are time, number of the move, share of it, its rate and second derivative, (n,) each.
+        """
+        steps, parts = np.diff(self.time), np.asarray(parts)
+        index = np.repeat(np.flatnonzero(steps > 0.0), parts.size)
+        since = np.tile(parts, np.count_nonzero(steps > 0.0)) * steps[index]
+        at, rate, change = self._places(index, since)
+        # To rounding the end of an interval may be in the next move.
+        number = np.floor(0.5 * (self.at[index] + self.at[index + 1])).astype(np.int64)
+        return self.time[index] + since, number, at - number, rate, change
+
+    def _places(
+        self, index: IntArray, since: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return what `places` does at times since the starts of intervals."""
+        rate, ends = self.rate[index], (self.at[index], self.at[index + 1])
+        change = (self.rate[index + 1] ** 2 - rate**2) / (2.0 * (ends[1] - ends[0]))
+        at = ends[0] + rate * since + 0.5 * change * since**2
+        return np.clip(at, *ends), rate + change * since, change
 
 
 class JointMotion(NamedTuple):
@@ -234,11 +255,9 @@ def law_of_shortest_time(
     if not moving.any():
         return law
     # Between grid points a limit may be exceeded by a little.
-    steps = np.linspace(0.0, 1.0, PARTS, endpoint=False, dtype=np.float64)
-    times = (law.time[:-1, None] + steps * np.diff(law.time)[:, None]).ravel()
-    at, rate, change = law.places(times[np.repeat(np.diff(law.time) > 0.0, PARTS)])
-    number = np.minimum(at.astype(np.int64), len(moves.step) - 1)
-    finer = Bounds.of(design, JointMotion.along(design, moves, number, at - number, bodies))
+    parts = np.linspace(0.0, 1.0, PARTS, endpoint=False, dtype=np.float64)
+    _, number, share, rate, change = law.within_intervals(parts)
+    finer = Bounds.of(design, JointMotion.along(design, moves, number, share, bodies))
     asked = (finer.a * change[:, None] + finer.b * rate[:, None] ** 2) / finer.most
     excess = max(1.0, asked.max(), (rate**2 / finer.square).max())
     return law.lasting(law.duration * math.sqrt(excess))

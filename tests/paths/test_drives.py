@@ -73,8 +73,8 @@ def test_work_of_the_actuators_from_rest_to_rest_is_the_change_of_potential_ener
         law_at_speed(OPTIMAL, StraightMoves.along(path, TOOL), 20.0, 200.0),
     ):
         found = drives_of(OPTIMAL, path, law, TOOL)
-        work = float(found.mean(found.power).sum()) * found.duration
-        size = found.duration * float(found.mean_power.sum())
+        work = float(found.mean(found.power).sum()) * found.law.duration
+        size = found.law.duration * float(found.figures.mean_power.sum())
         assert work == pytest.approx(after - before, abs=1e-4 * size)
 
 
@@ -82,12 +82,13 @@ def test_work_of_the_actuators_from_rest_to_rest_is_the_change_of_potential_ener
 def test_peaks_bound_means_and_the_least_motor_bounds_all_actuators(seed: int) -> None:
     path = random_path(seed)
     found = drives_of(OPTIMAL, path, law_of_duration(path, 0.3))
-    assert found.duration == pytest.approx(0.3)
-    assert (found.rms_force <= found.peak_force).all()
-    assert (found.mean_power <= found.peak_power).all()
-    assert (found.peak_power <= 1e-3 * found.peak_force * found.peak_speed).all()
-    largest = found.peak_force, found.rms_force, found.peak_speed, found.peak_power
-    assert found.least_motor == tuple(each.max() for each in largest)
+    assert found.law.duration == pytest.approx(0.3)
+    speed, force, steady, power, mean = found.figures
+    assert (steady <= force).all()
+    assert (mean <= power).all()
+    assert (power <= 1e-3 * force * speed).all()
+    for name, largest in found.least_motor.items():
+        assert largest == getattr(found.figures, name).max()
 
 
 def test_slower_law_has_slower_speeds_and_in_the_end_the_forces_at_rest() -> None:
@@ -108,7 +109,7 @@ def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
     law = law_of_duration(ALONG_GUIDE, duration)
     found = Drives.along(OPTIMAL, StraightMoves.along(ALONG_GUIDE), law, bodies)
     way = OPTIMAL.unit_mm * WAY
-    assert_allclose(found.peak_speed[[1, 3]], 2.0 * way / duration, rtol=1e-3)
+    assert_allclose(found.figures.peak_speed[[1, 3]], 2.0 * way / duration, rtol=1e-3)
     assert_allclose(np.abs(found.acceleration[:, [1, 3]]), 4.0 * way / duration**2, rtol=1e-2)
     # The weight of the point does no work, so that all power is that of its inertia.
     power = 1e-6 * mass * found.acceleration[:, 1] * found.speed[:, 1]
@@ -121,9 +122,9 @@ def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
     found = drives_of(OPTIMAL, path, law)
     assert found.binding == (None,) * 6
     limits = Actuators(
-        speed_mm_s=six(0.8 * found.peak_speed),
-        push_n=six(2.0 * found.peak_force),
-        continuous_n=six(found.rms_force / [1.0, 1.0, 1.0, 1.0, 1.0, 1.5]),
+        speed_mm_s=six(0.8 * found.figures.peak_speed),
+        push_n=six(2.0 * found.figures.peak_force),
+        continuous_n=six(found.figures.rms_force / [1.0, 1.0, 1.0, 1.0, 1.0, 1.5]),
     )
     *others, last = drives_of(msgspec.structs.replace(OPTIMAL, actuators=limits), path, law).binding
     assert last == ("continuous force", pytest.approx(1.5), None)
@@ -131,7 +132,7 @@ def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
         assert each is not None
         assert (each.limit, each.share) == ("speed", pytest.approx(1.25))
         speed = np.interp(each.time or 0.0, found.time, np.abs(found.speed[:, joint]))
-        assert speed == pytest.approx(found.peak_speed[joint])
+        assert speed == pytest.approx(found.figures.peak_speed[joint])
 
 
 def test_path_without_length_or_through_a_singular_pose_is_refused() -> None:

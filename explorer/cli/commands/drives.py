@@ -108,10 +108,10 @@ class Drives(options.JsonOptions, options.PathEndOptions):
 
 
 def _drives_json(found: DrivesOfPath, written: Sequence[Path]) -> dict[str, object]:
-    names = "peak_speed peak_force rms_force peak_power mean_power duration"
     return {
-        **output.attributes(found, names),
+        **found.figures._asdict(),
+        "duration": found.law.duration,
         "binding": [each and each._asdict() for each in found.binding],
-        "least_motor": found.least_motor._asdict(),
+        "least_motor": found.least_motor,
         **({"file": written[0]} if written else {}),
     }

@@ -43,7 +43,7 @@ def time_charts(drives: Drives) -> Element:
     for title, name, values in charts:
         rows = _drawn(values)
         curves = [np.stack([_drawn(drives.time), row], axis=-1) for row in rows.T]
-        across, up = (0.0, drives.duration), _ends([*rows.ravel(), 0.0])
+        across, up = (0.0, drives.law.duration), _ends([*rows.ravel(), 0.0])
         pieces += _chart(title, name, across, up, curves, top, HEIGHT)
         top += ABOVE + HEIGHT
     return _svg(top + BELOW, "Speeds, forces and powers of the actuators over time", pieces)
