@@ -258,7 +258,6 @@ GOALS: Mapping[ObjectiveName, str] = {
     "smallest-load": "load_share",
     "smallest-error": "worst_error",
     "smallest-deflection": "deflection",
-    "largest-acceleration": "acceleration",
 }
 """The name in the catalogue of the measure that each objective improves."""
 

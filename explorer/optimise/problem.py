@@ -30,31 +30,23 @@ ObjectiveName = Literal[
     "smallest-load",
     "smallest-error",
     "smallest-deflection",
-    "largest-acceleration",
 ]
 
 OBJECTIVES: tuple[ObjectiveName, ...] = get_args(ObjectiveName)
 """Objectives: to match the demanded volume (the paper's F = |1 − V/V′|), the shortest longest leg
 for it, the largest volume, the largest worst margin over the required box, and over that box the
-smallest largest share of a limit under the design's load, the smallest worst error, the smallest
-deflection under that load, and the largest acceleration in every direction."""
+smallest largest share of a limit under the design's load, the smallest worst error, and the
+smallest deflection under that load."""
 
 OF_THE_MACHINE: tuple[ObjectiveName, ...] = (
     "smallest-load",
     "smallest-error",
     "smallest-deflection",
-    "largest-acceleration",
 )
 """Objectives that are about the machine around the mechanism."""
 
 OVER_BOX: tuple[ObjectiveName, ...] = ("largest-margin", *OF_THE_MACHINE)
 """Objectives that are the worst of several values over the required box."""
-
-
-def words_without_value(objective: ObjectiveName) -> str:
-    """Return what stands in place of the value of an objective over a singular box."""
-    return "none" if objective == "largest-acceleration" else "infinite"
-
 
 YAW = "yaw"
 REACH = "reach"
@@ -90,10 +82,8 @@ AZIMUTHS = 12
 
 MOST_TILT = 90.0
 # The demands that are positive numbers.
-POSITIVE = (
-    *("volume", "reach", "clearance", "stroke_ratio"),
-    *("error", "deflection", "acceleration", "tilt"),
-)
+SIZES = ("volume", "reach", "clearance", "stroke_ratio")
+POSITIVE = (*SIZES, "error", "deflection", "acceleration", "tilt")
 
 
 class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -359,7 +349,7 @@ def _check_demands(problem: Problem) -> None:
 def _check_statics(problem: Problem) -> None:
     demands, design = problem.demands, problem.start
     needs_load = demands.held or problem.objective == "smallest-load"
-    moves = demands.acceleration is not None or problem.objective == "largest-acceleration"
+    moves = demands.acceleration is not None
     needs_error = demands.error is not None or problem.objective == "smallest-error"
     bends = demands.deflection is not None or problem.objective == "smallest-deflection"
     needs_box = needs_load or needs_error or bends or moves or demands.tilt is not None

@@ -31,7 +31,6 @@ from explorer.optimise.problem import (
     ObjectiveName,
     Problem,
     Variable,
-    words_without_value,
 )
 from explorer.optimise.solver import optimise_design
 
@@ -39,13 +38,15 @@ pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
 DEMANDS: tuple[dict[str, Any], ...] = (
-    *({"held": True}, {"error": 0.01}, {"deflection": 0.05}),
+    {"held": True},
+    {"error": 0.01},
+    {"deflection": 0.05},
     {"acceleration": 2.0},
 )
 # Places of the near face of a box, beyond a plane where they are negative.
 BESIDE = (-0.5, -1e-3, -1e-9, 0.0, 1e-9, 1e-3)
 # Orientations by yaw, pitch and roll; where the platform is level, two planes are the same.
-TURNS = ((-73.1, 0.0, 0.0), (-70.0, 12.0, -8.0), (35.0, -20.0, 25.0), (-60.0, -5.0, 10.0))
+TURNS = ((-73.1, 0.0, 0.0), (-70.0, 12.0, -8.0), (35.0, -20.0, 25.0))
 
 
 def machine(turn: Triple = TURNS[0], margin: float | None = None, source: Any = None) -> Design:
@@ -180,7 +181,7 @@ def test_search_over_a_singular_box_never_converges_where_forces_or_errors_count
         assert all(each.objective is not None or each.spare < 0.0 for each in outcome.history)
         if objective in OF_THE_MACHINE:
             assert outcome.best.objective is None
-            assert words_without_value(objective) in outcome.run.message
+            assert "infinite" in outcome.run.message
 
 
 @pytest.mark.parametrize(("objective", "turn"), list(zip(OF_THE_MACHINE, TURNS, strict=True)))

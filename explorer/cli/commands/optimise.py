@@ -37,8 +37,8 @@ class Optimise(options.JsonOptions, options.DesignOptions):
 
     objective: ObjectiveName = "match-volume"
     """Objective: F = |1 − V/V′| of the exact volume, the longest leg, the volume, or over the
-    required box the worst margin, the largest share of a limit of forces, the worst error, the
-    largest deflection under the load, or the acceleration in every direction."""
+    required box the worst margin, the largest share of a limit of forces, the worst error, or the
+    largest deflection under the load."""
 
     target_volume: Annotated[values.PositiveVolume, values.OPTIONAL] = None
     """Volume to match, or least volume; for the shortest leg by default that of the design."""

@@ -26,7 +26,6 @@ from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import encode_design
 from explorer.numerics.number_text import UNITS, format_number, power_of_ten
 from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Curve, Record, curves_of
-from explorer.optimise.problem import words_without_value
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
@@ -141,8 +140,7 @@ def search_section(data: ReportData) -> Iterator[Element]:
     if problem.demands.volume is not None:
         rows.append(("demanded volume, units³", problem.demands.volume))
     if best is not None:
-        missing = words_without_value(problem.objective)
-        value = missing if best.objective is None else best.objective
+        value = "infinite" if best.objective is None else best.objective
         rows.append((OBJECTIVE_SYMBOLS[problem.objective], value))
         rows.append(("volume, units³", best.volume))
     rows += [

@@ -26,7 +26,6 @@ from explorer.measures.box import BoxStatics
 from explorer.measures.measure import longest_leg
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES, Design
-from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.optimise.problem import SHIFTS, Problem
@@ -282,16 +281,11 @@ class LoadDemand(Demand):
 
 
 class AccelerationDemand(LoadDemand):
-    """The largest acceleration from rest that each part allows, over the required box.
+    """The largest acceleration from rest that each part allows, over the required box, in m/s²."""
 
-    In m/s²; the least one that is demanded is of the size of that at the start if none is given.
-    """
-
-    def __init__(self, start: State, least: float | None = None) -> None:
+    def __init__(self, start: State, least: float) -> None:
         super().__init__(start, 1.0)
-        # Below zero where the payload is not held.
-        own = abs(_scale_of(start, lambda box: -box.accelerations))
-        self.least = least or max(own, STANDARD_GRAVITY)
+        self.least = least
         self.names = tuple(name.replace("load of", "acceleration by", 1) for name in self.names)
 
     def measure(self, state: State) -> Measured:

@@ -7,7 +7,7 @@ all of them, which keeps the functions smooth.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +16,7 @@ import numpy as np
 from explorer.errors import DesignError
 from explorer.measures.box import box_margins
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.optimise.problem import AZIMUTHS, OF_THE_MACHINE, OVER_BOX, ObjectiveName, Problem
+from explorer.optimise.problem import AZIMUTHS, OF_THE_MACHINE, OVER_BOX, Problem
 from explorer.optimise.search import demands, grid_demands
 from explorer.optimise.search.state import UNBOUNDED, State, bounds_of, scales
 
@@ -153,8 +153,7 @@ class Model:
             case "largest-volume":
                 root, gradient = state.volume_root(self._volume)
                 return -root, -gradient
-            case _:
-                # The worst of several values, one of `OVER_BOX`.
+            case "largest-margin" | "smallest-load" | "smallest-error" | "smallest-deflection":
                 slope = np.zeros(len(u))
                 slope[-1] = -1.0
                 return -float(u[-1]), slope
@@ -185,8 +184,7 @@ class Model:
 def reported_objective(problem: Problem, state: State) -> float:
     """Return the value that the objective of a problem is about, in its own unit.
 
-    Loads, errors and deflections over a box on or across a singular plane are infinite, and so is,
-    below zero, the acceleration.
+    Loads, errors and deflections over a box on or across a singular plane are infinite.
     """
     match problem.objective:
         case "match-volume":
@@ -203,19 +201,7 @@ def reported_objective(problem: Problem, state: State) -> float:
             values = state.statics.errors.displacement
         case "smallest-deflection":
             values = state.statics.deflections
-        case "largest-acceleration":
-            return -state.statics.worst(-state.statics.accelerations)
     return state.statics.worst(values)
-
-
-RAISED: Mapping[ObjectiveName, Callable[[State], demands.Demand]] = {
-    "largest-margin": demands.MarginDemand,
-    "smallest-load": grid_demands.LoadDemand,
-    "smallest-error": lambda start: grid_demands.DisplacementDemand(start, "error"),
-    "smallest-deflection": lambda start: grid_demands.DisplacementDemand(start, "deflection"),
-    "largest-acceleration": grid_demands.AccelerationDemand,
-}
-"""What each objective of the worst of several values raises, given the start."""
 
 
 def _demands(problem: Problem, start: State) -> list[demands.Demand]:
@@ -248,6 +234,12 @@ def _demands(problem: Problem, start: State) -> list[demands.Demand]:
     if machine or problem.objective in OF_THE_MACHINE:
         listed.append(demands.MarginDemand(start, is_open=True))
     # What an objective raises comes last.
-    if problem.objective in RAISED:
-        listed.append(RAISED[problem.objective](start))
+    if problem.objective == "largest-margin":
+        listed.append(demands.MarginDemand(start))
+    elif problem.objective == "smallest-load":
+        listed.append(grid_demands.LoadDemand(start))
+    elif problem.objective == "smallest-error":
+        listed.append(grid_demands.DisplacementDemand(start, "error"))
+    elif problem.objective == "smallest-deflection":
+        listed.append(grid_demands.DisplacementDemand(start, "deflection"))
     return listed

@@ -25,7 +25,7 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii, format_number
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Iterate, Phase, Run, Status
-from explorer.optimise.problem import OVER_BOX, Problem, words_without_value
+from explorer.optimise.problem import OVER_BOX, Problem
 from explorer.optimise.search.demands import MET
 from explorer.optimise.search.model import Evaluation, Model, reported_objective
 from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimality, solve
@@ -341,9 +341,7 @@ def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
     # F compares numbers of unit size.
     size = 1.0 if problem.objective == "match-volume" else 0.0
     objective = attempt.best.objective
-    value = words_without_value(problem.objective)
-    if objective is not None:
-        value = format_ascii(objective, 6, size=size)
+    value = "infinite" if objective is None else format_ascii(objective, 6, size=size)
     end = f"{name} = {value} after {steps} iterations"
     held = f", held by {attempt.holding}" if attempt.holding else ""
     messages: dict[Status, str] = {

@@ -212,8 +212,7 @@ class Trail:
         if problem.objective != "match-volume" and problem.demands.volume is not None:
             short = 1.0 - iterate.volume / problem.demands.volume
             missed = max(missed, short) if short > MET else missed
-        # A larger objective is better, unless there is none.
-        larger = problem.objective.startswith("largest") and iterate.objective is not None
+        larger = problem.objective in ("largest-volume", "largest-margin")
         return iterate.volume <= 0.0, missed, -iterate.value if larger else iterate.value
 
 

@@ -49,7 +49,6 @@ OBJECTIVES: dict[str, ObjectiveName] = {
     "smallest load over a box": "smallest-load",
     "smallest error over a box": "smallest-error",
     "smallest deflection over a box": "smallest-deflection",
-    "largest acceleration over a box": "largest-acceleration",
 }
 FREE = {
     **{name: f"Let {name} change." for name in VARIABLES},

@@ -90,7 +90,7 @@ def _reached_text(problem: problems.Problem, iterate: Iterate, state: State) -> 
         return f"volume {state.unit_of(3).text(iterate.volume, 5)}"
     name = OBJECTIVE_SYMBOLS[problem.objective]
     if iterate.objective is None:
-        return f"{name} {problems.words_without_value(problem.objective)}"
+        return f"{name} infinite"
     return f"{name} {goal_unit(problem, state).text(iterate.objective, 6)}"
 
 
