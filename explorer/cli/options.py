@@ -240,39 +240,6 @@ class EndOptions:
 
 
 END_OPTIONS = "with --to, --to-quaternion, --to-yaw-pitch-roll, --to-tilt-torsion or --to-folds"
-_INSTEAD_AT_START = values.hint("instead of --from-quaternion")
-
-
-@dataclass(frozen=True, kw_only=True)
-class PathEndOptions(EndOptions, PointOptions):
-    """The options for the design, and for the two ends of a path."""
-
-    from_: Annotated[
-        values.PoseNumbers,
-        tyro.conf.arg(name="from", help_behavior_hint="(default: the home pose)"),
-    ] = None
-    """Start of the path; lengths are in design units."""
-
-    from_quaternion: Annotated[values.Quaternion, values.OF_HOME] = None
-    """Orientation of the platform at the start."""
-
-    from_yaw_pitch_roll: Annotated[values.YawPitchRoll, _INSTEAD_AT_START] = None
-    """Orientation of the platform at the start, in degrees."""
-
-    from_tilt_torsion: Annotated[values.TiltTorsion, _INSTEAD_AT_START] = None
-    """Azimuth, tilt and torsion of the platform at the start, in degrees."""
-
-    from_folds: Annotated[values.Folds, values.hint("instead of --from")] = None
-    """Folds of the pose at the start; r in design units, angles in degrees."""
-
-    to: Annotated[values.PoseNumbers, values.OPTIONAL] = None
-    """End of the path; lengths are in design units."""
-
-    def ends(self, design: Design) -> tuple[Pose, Pose | None]:
-        """Return the poses at start and end; the end is None if it is not given."""
-        tool = self.tool(design)
-        start = make_pose(self, "from_", design.home_pose, self.from_, tool)
-        return start, self.end(start, self.to, tool)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,6 +11,7 @@ import numpy as np
 from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
 from explorer.paths.drives import Drives
 from explorer.paths.trajectory import Trajectory
 from explorer.statics.accuracy import IS_TILT, SOURCES
@@ -23,12 +24,7 @@ def trajectory_csv(trajectory: Trajectory) -> str:
     The header has the unit of each length, such as "l1 [10 mm]". Numbers round-trip to the
     last bit.
     """
-    columns = [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
-    head = ["time_s", *length_heads((*JOINTS, *"xyz"), trajectory.unit_mm)]
-    head += ["qw", "qx", "qy", "qz"]
-    if trajectory.tool_position is not None:
-        columns.append(trajectory.tool_position)
-        head += length_heads([f"tool_{axis}" for axis in "xyz"], trajectory.unit_mm)
+    head, columns = _columns(trajectory, trajectory.unit_mm)
     return _csv(head, np.column_stack(columns).tolist())
 
 
@@ -38,22 +34,20 @@ def drives_csv(drives: Drives, trajectory: Trajectory) -> str:
     The trajectory of the same path and time law gives the samples. Times are in s, lengths in mm,
     speeds in mm/s, forces in N and powers in W, as the header says.
     """
-    mm = trajectory.unit_mm
-    head, columns = ["time_s"], [trajectory.time, mm * trajectory.joints]
-    head += [f"{joint} [mm]" for joint in JOINTS]
-    for name, unit, values in (
-        ("speed", "mm/s", drives.speed),
-        ("force", "N", drives.force),
-        ("power", "W", drives.power),
-    ):
+    head, columns = _columns(trajectory, 1.0)
+    for name, unit in (("speed", "mm/s"), ("force", "N"), ("power", "W")):
         head += [f"{joint} {name} [{unit}]" for joint in JOINTS]
-        columns += [np.interp(trajectory.time, drives.time, each) for each in values.T]
-    head += [*(f"{axis} [mm]" for axis in "xyz"), "qw", "qx", "qy", "qz"]
-    columns += [mm * trajectory.position, trajectory.quaternion]
-    if trajectory.tool_position is not None:
-        head += [f"tool_{axis} [mm]" for axis in "xyz"]
-        columns.append(mm * trajectory.tool_position)
+        columns += [np.interp(trajectory.time, drives.time, v) for v in getattr(drives, name).T]
     return _csv(head, np.column_stack(columns).tolist())
+
+
+def _columns(trajectory: Trajectory, unit_mm: float) -> tuple[list[str], list[FloatArray]]:
+    """Return headings and columns of a trajectory, with a unit of lengths."""
+    scale, tool = trajectory.unit_mm / unit_mm, trajectory.tool_position
+    columns = [trajectory.time, scale * trajectory.joints, scale * trajectory.position]
+    columns += [trajectory.quaternion, *([] if tool is None else [scale * tool])]
+    head = ["time_s", *length_heads((*JOINTS, *"xyz"), unit_mm), "qw", "qx", "qy", "qz"]
+    return head + length_heads([f"tool_{a}" for a in "xyz" if tool is not None], unit_mm), columns
 
 
 def corners_csv(poses: Iterable[Pose], tool: Triple | None = None) -> str:
@@ -90,8 +84,8 @@ def tolerance_csv(costs: SourceCosts) -> str:
 
 def length_heads(names: Iterable[str], unit_mm: float) -> list[str]:
     """Return headings of lengths in design units, such as "l1 [10 mm]"."""
-    unit = repr(unit_mm).removesuffix(".0")
-    return [f"{name} [{unit} mm]" for name in names]
+    unit = "mm" if unit_mm == 1.0 else f"{repr(unit_mm).removesuffix('.0')} mm"
+    return [f"{name} [{unit}]" for name in names]
 
 
 def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:

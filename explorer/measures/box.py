@@ -24,12 +24,7 @@ from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.statics import compliance, slopes
 from explorer.statics.accuracy import ToolError, actuator_errors, worst_errors
 from explorer.statics.forces import SINGULAR
-from explorer.statics.reactions import (
-    Reactions,
-    largest_accelerations,
-    limit_shares,
-    reactions,
-)
+from explorer.statics.reactions import Reactions, largest_accelerations, limit_shares, reactions
 from explorer.statics.weights import MovingBodies, payload_wrench
 from explorer.workspace.least_clearance import node_measures
 

@@ -80,8 +80,7 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     inertia_kg_mm2: Triple = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        # The weights of parts are payloads too, and those of a machine of kilometres are large.
-        _set(self, "mass_kg", not_negative("payload.mass_kg", self.mass_kg, STIFFEST))
+        _set(self, "mass_kg", not_negative("payload.mass_kg", self.mass_kg))
         _set(self, "centre", tuple(numbers("payload.centre", self.centre, 3)))
         _set(self, "force_n", not_negative("payload.force_n", self.force_n))
         name = "payload.inertia_kg_mm2"

@@ -1,9 +1,8 @@
 """Time laws: how a path of straight moves is gone through in time, from rest to rest.
 
-A law keeps the geometry of its path, so that it stops at every corner: the actuators would need
-infinite accelerations to pass one. It is the rate of the share of a move at grid points, between
-which the second derivative of the share is constant. One law goes at a given speed with a limited
-acceleration, another takes the shortest time that the limits of the actuators allow.
+A law keeps the geometry of its path, so that it stops at every corner, which only infinite
+accelerations would pass. It is the rate of the share of a move at grid points, between which the
+second derivative of the share is constant.
 
 With x the squared rate and u the change of the rate, speeds bound x, and accelerations and forces
 bound sums a u + b x. These bounds hold at both ends of every interval between grid points, in which
@@ -16,12 +15,12 @@ is slowed down by the little by which a grid ten times finer shows it to exceed 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.errors import InputError, NoAnswerError
 from explorer.files.extras import load_extra
@@ -77,7 +76,8 @@ class TimeLaw:
         Raises:
             InputError: The duration is not above zero, or the path has no length.
         """
-        _check_positive("duration", duration)
+        if not 0.0 < duration < math.inf:
+            raise InputError(f"the duration must be above zero; got {duration:g} s")
         if self.duration == 0.0:
             raise InputError("the path has no length: all its poses are the same")
         slower = duration / self.duration
@@ -86,31 +86,26 @@ class TimeLaw:
     def places(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return place, its rate and its second derivative at times (n,), each of shape (n,)."""
         index = np.clip(np.searchsorted(self.time, time, "right") - 1, 0, len(self.time) - 2)
-        return self._places(index, time - self.time[index])
+        since, rate = time - self.time[index], self.rate[index]
+        change = np.diff(self.rate**2) / (2.0 * np.diff(self.at))
+        at = self.at[index] + rate * since + 0.5 * change[index] * since**2
+        ends = self.at[index], self.at[index + 1]
+        return np.clip(at, *ends), rate + change[index] * since, change[index]
 
     def within_intervals(
-        self, parts: ArrayLike
+        self, parts: Sequence[float]
     ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
         """Return what the law is at parts of the intervals that take time, from 0 to below 1.
 
         They are time, number of the move, share of it, its rate and second derivative, (n,) each.
         """
-        steps, parts = np.diff(self.time), np.asarray(parts)
-        index = np.repeat(np.flatnonzero(steps > 0.0), parts.size)
-        since = np.tile(parts, np.count_nonzero(steps > 0.0)) * steps[index]
-        at, rate, change = self._places(index, since)
+        steps = np.diff(self.time)[:, None]
+        time = (self.time[:-1, None] + steps * np.array(parts))[steps[:, 0] > 0.0].ravel()
+        at, rate, change = self.places(time)
         # To rounding the end of an interval may be in the next move.
-        number = np.floor(0.5 * (self.at[index] + self.at[index + 1])).astype(np.int64)
-        return self.time[index] + since, number, at - number, rate, change
-
-    def _places(
-        self, index: IntArray, since: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return what `places` does at times since the starts of intervals."""
-        rate, ends = self.rate[index], (self.at[index], self.at[index + 1])
-        change = (self.rate[index + 1] ** 2 - rate**2) / (2.0 * (ends[1] - ends[0]))
-        at = ends[0] + rate * since + 0.5 * change * since**2
-        return np.clip(at, *ends), rate + change * since, change
+        middles = 0.5 * (self.at[:-1] + self.at[1:])[steps[:, 0] > 0.0]
+        number = np.repeat(middles.astype(np.int64), len(parts))
+        return time, number, at - number, rate, change
 
 
 class JointMotion(NamedTuple):
@@ -210,9 +205,10 @@ def law_at_speed(
     Raises:
         InputError: There is no move, or the speed or the acceleration is not above zero.
     """
-    _check_positive("acceleration", acceleration)
-    if speed != math.inf:
-        _check_positive("speed", speed)
+    if not (speed > 0.0 and 0.0 < acceleration < math.inf):
+        raise InputError(
+            f"speed and acceleration must be above zero; got {speed:g} and {acceleration:g}"
+        )
     number, share = _grid(moves, DEFAULT_POINTS)
     position, rotation = moves.poses(number, share)
     twist = moves.slopes(number, rotation)[0]
@@ -255,17 +251,11 @@ def law_of_shortest_time(
     if not moving.any():
         return law
     # Between grid points a limit may be exceeded by a little.
-    parts = np.linspace(0.0, 1.0, PARTS, endpoint=False, dtype=np.float64)
-    _, number, share, rate, change = law.within_intervals(parts)
+    _, number, share, rate, change = law.within_intervals([i / PARTS for i in range(PARTS)])
     finer = Bounds.of(design, JointMotion.along(design, moves, number, share, bodies))
     asked = (finer.a * change[:, None] + finer.b * rate[:, None] ** 2) / finer.most
     excess = max(1.0, asked.max(), (rate**2 / finer.square).max())
     return law.lasting(law.duration * math.sqrt(excess))
-
-
-def _check_positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError(f"the {name} must be above zero; got {value:g}")
 
 
 def _grid(moves: StraightMoves, points: int) -> tuple[IntArray, FloatArray]:

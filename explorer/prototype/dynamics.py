@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.drives import Drives, check_limits
 from explorer.paths.time_law import TimeLaw, law_at_speed, law_of_shortest_time
-from explorer.prototype.weights import DENSITY, Mass, bar_masses, moving_bodies
+from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies
 from explorer.statics.forces import forces_of
 from explorer.statics.weights import MovingBodies, carry
 
@@ -27,8 +27,6 @@ def inverse_dynamics(
     twist: ArrayLike,
     acceleration: ArrayLike,
     legs: bool = True,
-    *,
-    masses: Mapping[str, Mass] | None = None,
 ) -> FloatArray:
     """Return the forces of the actuators in a motion, shape (..., 6), in newtons.
 
@@ -43,10 +41,9 @@ def inverse_dynamics(
         twist: Velocity of b4 and angular velocity (v; ω), base axes, shape (..., 6), in design
             units and radians per second.
         acceleration: Their rates (v̇; ω̇), shape (..., 6), in design units and radians per s².
-        legs: Whether the bodies of the prototype have their masses; else the payload of the design,
-            which then stands for platform and tool too, counts alone.
-        masses: Masses of the bodies, see `moving_bodies`; of bars as in the exported simulation if
-            None.
+        legs: Whether the bodies of the prototype have their masses, those of bars as in the
+            exported simulation; else the payload of the design, which then stands for platform and
+            tool too, counts alone.
 
     Raises:
         InputError: A number is not finite, the rotation is not one, batch axes do not broadcast, or
@@ -54,11 +51,11 @@ def inverse_dynamics(
     """
     bodies = MovingBodies().with_payload(design)
     if legs:
-        bodies = moving_bodies(design, masses or bar_masses(design, DENSITY))
-    if not bodies.platform[3][3] > 0.0:
+        bodies = moving_bodies(design, bar_masses(design, DENSITY))
+    elif not design.payload.mass_kg:
         raise InputError(
             "the platform has no mass, so that no motion asks a force for it: give the payload of "
-            "the design a mass, or the platform one of its own"
+            "the design a mass, or let the bodies of the prototype count"
         )
     c = Configuration(design, position, rotation)
     return forces_of(c, carry(c, bodies, twist, acceleration).wrench)

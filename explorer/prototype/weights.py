@@ -136,7 +136,7 @@ def moving_bodies(
         row[SIDE_X : SIDE_Y + 1] += cylinder.mass * (height / metres) ** 2
         row[AXIS_X:] = axis
     own = masses["platform"]
-    bodies = MovingBodies.of_legs(rows).with_mass(
+    bodies = MovingBodies(legs=rows).with_mass(
         own.mass, own.centre / metres, own.inertia / metres**2
     )
     return bodies.with_payload(design) if payload else bodies

@@ -48,13 +48,14 @@ class MovingBodies:
             holds; and this axis in the base frame.
     """
 
-    platform: tuple[tuple[float, ...], ...] = ((0.0,) * 4,) * 4
-    legs: tuple[tuple[float, ...], ...] = ((0.0,) * 11,) * 4
+    platform: ArrayLike = ((0.0,) * 4,) * 4
+    legs: ArrayLike = ((0.0,) * 11,) * 4
 
-    @staticmethod
-    def of_legs(rows: FloatArray) -> MovingBodies:
-        """Return the bodies of legs alone, by their numbers (4, 11)."""
-        return MovingBodies(legs=_plain(rows))
+    def __post_init__(self) -> None:
+        # Plain numbers, so that bodies can be compared.
+        for name in ("platform", "legs"):
+            rows: list[list[float]] = np.asarray(getattr(self, name), dtype=np.float64).tolist()
+            object.__setattr__(self, name, tuple(map(tuple, rows)))
 
     def with_mass(
         self, mass: float, centre: ArrayLike, inertia: ArrayLike = ((0.0,) * 3,) * 3
@@ -68,7 +69,7 @@ class MovingBodies:
         matrix[:3, 3] += mass * off
         matrix[3, :3] += mass * off
         matrix[3, 3] += mass
-        return replace(self, platform=_plain(matrix))
+        return replace(self, platform=matrix)
 
     def with_payload(self, design: Design) -> MovingBodies:
         """Return these bodies with the payload of a design."""
@@ -80,11 +81,6 @@ class MovingBodies:
     def arrays(self) -> tuple[FloatArray, FloatArray]:
         """The platform's matrix (4, 4) and the legs' rows (4, 11)."""
         return np.array(self.platform), np.array(self.legs)
-
-
-def _plain(rows: FloatArray) -> tuple[tuple[float, ...], ...]:
-    """Return numbers (n, m) as tuples, so that bodies can be compared."""
-    return tuple(tuple(map(float, row)) for row in rows)
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ def test_drives_take_the_corners_of_a_planned_path_and_the_shortest_time_of_a_de
     [
         ([], "--path"),
         (MOVE, "choose a duration"),
-        ([*MOVE, "--speed", "3"], "belong together"),
+        ([*MOVE, "--speed", "3"], "--speed needs --acceleration"),
         ([*MOVE, "--speed", "3", "--acceleration", "9", "--duration", "1"], "either --duration"),
         ([*MOVE, "--duration", "0"], "a positive number"),
         (["--to", "12", "40", "8", "--duration", "1"], "leaves the limits"),

@@ -14,11 +14,11 @@ from refusals import refusal
 from explorer import (
     PRESETS,
     Actuators,
+    Configuration,
     Design,
     NoAnswerError,
     Payload,
     Pose,
-    inverse_dynamics,
     joint_accelerations,
     joint_rates,
 )
@@ -28,7 +28,8 @@ from explorer.paths import time_law
 from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.paths.trajectory import trajectory
 from explorer.prototype.weights import bar_masses, moving_bodies
-from explorer.statics.weights import MovingBodies
+from explorer.statics.forces import forces_of
+from explorer.statics.weights import MovingBodies, carry
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose
@@ -89,7 +90,8 @@ def shares_of_limits(design: Design, path: list[Pose], law: TimeLaw) -> np.ndarr
     poses = moves.poses(number, at - number)
     twist, bend = moves.slopes(number, poses[1])
     motion = rate[:, None] * twist, change[:, None] * twist + rate[:, None] ** 2 * bend
-    forces = inverse_dynamics(design, *poses, *motion, masses=bar_masses(design, DENSITY))
+    c = Configuration(design, *poses)
+    forces = forces_of(c, carry(c, bodies_of(design), *motion).wrench)
     limits = design.actuators
     assert limits.speed_mm_s
     assert limits.acceleration_mm_s2

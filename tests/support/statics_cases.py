@@ -44,7 +44,7 @@ class LegMasses:
         rows[:, ROD], rows[:, ROD_CENTRE] = self.rods, self.rod_centres
         rows[:, MOMENT] = np.multiply(self.cylinders, self.cylinder_centres)
         rows[:, AXIS_X] = 1.0
-        return MovingBodies.of_legs(rows)
+        return MovingBodies(legs=rows)
 
 
 @dataclass(frozen=True)

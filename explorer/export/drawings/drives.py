@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -22,12 +23,7 @@ WIDTH, HEIGHT, TALL = 340.0, 84.0, 240.0
 LEFT, RIGHT, ABOVE, BELOW, LEGEND = 46.0, 12.0, 24.0, 38.0, 16.0
 # A colour for each leg; the actuator along the guide is dashed.
 _LEGS: tuple[Rgb, ...] = ((46, 116, 208), (202, 112, 12), (22, 146, 118), (186, 64, 128))
-_LOOKS: tuple[tuple[Rgb, str | None], ...] = (
-    (_LEGS[0], None),
-    *((_LEGS[1], "5 3"), (_LEGS[1], None)),
-    *((_LEGS[2], "5 3"), (_LEGS[2], None)),
-    (_LEGS[3], None),
-)
+_LOOKS = [(_LEGS[leg], "5 3" if d in (1, 3) else None) for d, leg in enumerate((0, 1, 1, 2, 2, 3))]
 # Room beyond the values of an axis, as a share of their span.
 ROOM = 0.06
 
@@ -43,8 +39,8 @@ def time_charts(drives: Drives) -> Element:
     for title, name, values in charts:
         rows = _drawn(values)
         curves = [np.stack([_drawn(drives.time), row], axis=-1) for row in rows.T]
-        across, up = (0.0, drives.law.duration), _ends([*rows.ravel(), 0.0])
-        pieces += _chart(title, name, across, up, curves, top, HEIGHT)
+        chart = _Chart((0.0, drives.law.duration), _ends([*rows.ravel(), 0.0]), top, HEIGHT)
+        pieces += chart.draw(title, name, curves)
         top += ABOVE + HEIGHT
     return _svg(top + BELOW, "Speeds, forces and powers of the actuators over time", pieces)
 
@@ -56,17 +52,15 @@ def force_speed_chart(drives: Drives) -> Element:
     # Lowest and highest values of both axes, shape (2, 2, 6).
     limits = np.array([[-speed, speed], [-pull, push]])
     both = np.stack([_drawn(drives.speed), _drawn(drives.force)])
-    across, up = (
-        _ends([*values.ravel(), *most.ravel()]) for values, most in zip(both, limits, strict=True)
-    )
+    ends = [_ends([*both[i].ravel(), *limits[i].ravel()]) for i in (0, 1)]
+    chart = _Chart(ends[0], ends[1], LEGEND, TALL)
     curves = [both[..., joint].T for joint in range(6)]
-    pieces = [*_legend(), *_chart("force (N)", "speed (mm/s)", across, up, curves, LEGEND, TALL)]
+    pieces = [*_legend(), *chart.draw("force (N)", "speed (mm/s)", curves)]
     # A side without a limit lies at the end of its axis.
-    sides = np.clip(limits, *np.transpose([across, up])[..., None, None])
+    sides = np.clip(limits, *np.transpose(ends)[..., None, None])
     boxes = np.unique(sides.reshape(4, 6), axis=1).T if np.isfinite(limits).any() else ()
     for x0, x1, y0, y1 in boxes:
-        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-        path = path_of(_place(corners, across, up, LEGEND + ABOVE, TALL), "Z")
+        path = path_of(chart.place(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])))
         pieces.append(element("path", d=path, class_="limit"))
     words = "Forces of the actuators against their speeds"
     return _svg(LEGEND + ABOVE + TALL + BELOW, words, pieces)
@@ -74,12 +68,9 @@ def force_speed_chart(drives: Drives) -> Element:
 
 def _svg(height: float, title: str, pieces: Iterable[Element]) -> Element:
     view = f"0 0 {coordinate(WIDTH)} {coordinate(height)}"
+    look = {"class_": "drives", "viewBox": view, "role": "img"}
     return element(
-        *("svg", element("title", title), *pieces),
-        class_="drives",
-        viewBox=view,
-        role="img",
-        xmlns="http://www.w3.org/2000/svg",
+        "svg", element("title", title), *pieces, xmlns="http://www.w3.org/2000/svg", **look
     )
 
 
@@ -104,40 +95,37 @@ def _legend() -> Iterator[Element]:
         yield drawing_text(name, x + 24.0, 12.0)
 
 
-def _place(
-    points: FloatArray,
-    across: tuple[float, float],
-    up: tuple[float, float],
-    top: float,
-    height: float,
-) -> FloatArray:
-    """Return points (n, 2) of a chart as places in the drawing."""
-    (x0, x1), (y0, y1) = across, up
-    x = LEFT + (WIDTH - LEFT - RIGHT) * (points[:, 0] - x0) / (x1 - x0)
-    return np.stack([x, top + height * (y1 - points[:, 1]) / (y1 - y0)], axis=-1)
+class _Chart(NamedTuple):
+    """The ends of both axes of a chart, its top and its height in the drawing."""
 
+    across: tuple[float, float]
+    up: tuple[float, float]
+    top: float
+    height: float
 
-def _chart(
-    title: str,
-    name: str,
-    across: tuple[float, float],
-    up: tuple[float, float],
-    curves: Iterable[FloatArray],
-    top: float,
-    height: float,
-) -> Iterator[Element]:
-    """Yield a chart with the title of its upright axis; the other axis has numbers if named."""
-    width, top = WIDTH - LEFT - RIGHT, top + ABOVE
-    scales = width / (across[1] - across[0]), height / (up[1] - up[0])
+    def place(self, points: FloatArray) -> FloatArray:
+        """Return points (n, 2) of the chart as places in the drawing."""
+        (x0, x1), (y0, y1) = self.across, self.up
+        x = LEFT + (WIDTH - LEFT - RIGHT) * (points[:, 0] - x0) / (x1 - x0)
+        y = self.top + ABOVE + self.height * (y1 - points[:, 1]) / (y1 - y0)
+        return np.stack([x, y], axis=-1)
 
-    def words(value: float) -> str:
-        return format_number(value, 5) if name else ""
+    def draw(self, title: str, name: str, curves: Iterable[FloatArray]) -> Iterator[Element]:
+        """Yield axes and curves; the axis across has numbers if it has a name."""
+        origin = np.array([[self.across[0], self.up[0]], [self.across[1], self.up[1]]])
+        (left, bottom), (right, top) = self.place(origin).tolist()
+        (width, height), (x, y) = (right - left, bottom - top), np.diff(origin, axis=0)[0]
 
-    yield drawing_text(title, 4.0, top - 8.0, "axis")
-    yield ruler(
-        name, across, LEFT, scales[0], across=top + height, up=False, grid=height, words=words
-    )
-    yield ruler("", up, top + height, scales[1], across=LEFT, up=True, grid=width)
-    for curve, (colour, dash) in zip(curves, _LOOKS, strict=True):
-        path = path_of(_place(curve, across, up, top, height), "", decimals=1)
-        yield element("path", d=path, stroke=css(colour), stroke_dasharray=dash, class_="drive")
+        def words(value: float) -> str:
+            return format_number(value, 5) if name else ""
+
+        scale = width / x
+        yield drawing_text(title, 4.0, top - 8.0, "axis")
+        yield ruler(
+            name, self.across, left, scale, across=bottom, up=False, grid=height, words=words
+        )
+        yield ruler("", self.up, bottom, height / y, across=left, up=True, grid=width)
+        for curve, (colour, dash) in zip(curves, _LOOKS, strict=True):
+            path = path_of(self.place(curve), "", decimals=1)
+            look = {"stroke": css(colour), "stroke_dasharray": dash, "class_": "drive"}
+            yield element("path", d=path, **look)

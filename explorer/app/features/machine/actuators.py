@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import msgspec
 import viser
@@ -13,16 +13,13 @@ from explorer.app.state.actions import Action, Set
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.design_file import STIFFNESSES
+from explorer.mechanism.design_file import STIFFNESS
 from explorer.mechanism.machine import Six
 from explorer.numerics.number_text import format_number
 
 # A limit of the forces that is switched on begins with this, in N.
 FORCE = 100.0
 FORCES: Six = (FORCE, FORCE, FORCE, FORCE, FORCE, FORCE)
-# Those of speeds and accelerations begin with these, in mm/s and mm/s².
-SPEEDS: Six = (200.0, 200.0, 200.0, 200.0, 200.0, 200.0)
-ACCELERATIONS: Six = (2000.0, 2000.0, 2000.0, 2000.0, 2000.0, 2000.0)
 # Steps of number fields, which show no more decimals.
 FINE, MEDIUM = 0.001, 0.01
 
@@ -104,7 +101,7 @@ class Quantity(NamedTuple):
         unit: Its unit.
         meaning: Beginning of the sentence on it.
         step: Step of its fields.
-        start: Six numbers to begin with; None for those of the push.
+        start: Number to begin with; None for those of the push.
     """
 
     name: str
@@ -112,7 +109,7 @@ class Quantity(NamedTuple):
     unit: str
     meaning: str
     step: float
-    start: Six | None = None
+    start: float | None = None
 
     @property
     def path(self) -> str:
@@ -125,7 +122,8 @@ class Quantity(NamedTuple):
 
     def first(self, state: State) -> Six:
         """Return the six numbers; where there are none, those to begin with."""
-        return self.given(state) or self.start or PUSH.given(state) or FORCES
+        six = None if self.start is None else cast("Six", (self.start,) * 6)
+        return self.given(state) or six or PUSH.given(state) or FORCES
 
 
 PUSH = Quantity("push_n", "push", "N", "Largest force that increases a joint's value", MEDIUM)
@@ -133,23 +131,13 @@ PULL = Quantity("pull_n", "pull", "N", "Largest force that decreases it", MEDIUM
 CONTINUOUS = Quantity(
     "continuous_n", "continuous force", "N", "Largest root-mean-square force of a motion", MEDIUM
 )
-SPEED = Quantity("speed_mm_s", "speed", "mm/s", "Largest speed to either side", 1.0, SPEEDS)
+SPEED = Quantity("speed_mm_s", "speed", "mm/s", "Largest speed to either side", 1.0, 200.0)
 ACCELERATION = Quantity(
-    "acceleration_mm_s2",
-    "acceleration",
-    "mm/s²",
-    "Largest acceleration to either side",
-    10.0,
-    ACCELERATIONS,
+    "acceleration_mm_s2", "acceleration", "mm/s²", "Largest acceleration either way", 10.0, 2000.0
 )
 ERROR = Quantity("error_mm", "error", "mm", "Largest positioning error to either side", FINE)
 STIFF = Quantity(
-    "stiffness_n_mm",
-    "stiffness",
-    "N/mm",
-    "Force along the joint per deflection",
-    1.0,
-    STIFFNESSES,
+    "stiffness_n_mm", "stiffness", "N/mm", "Force along the joint per deflection", 1.0, STIFFNESS
 )
 
 # Those that are None while a switch is off, with its words.

@@ -58,4 +58,4 @@ def drives_html(drawing: DrivesDrawing | ExplorerError) -> str:
     """Return what a path asks of the actuators, or why there is no answer, as HTML."""
     if isinstance(drawing, ExplorerError):
         return alert("No speeds and forces", sentence(str(drawing)))
-    return f'{render(drawing.blocks)}<div class="ex-drives">{drawing.charts}</div>'
+    return f'{render(drawing.blocks)}<div class="ex-map ex-drives">{drawing.charts}</div>'
