@@ -212,6 +212,7 @@ def make_pose(
     return Pose((x, y, z), pose.quaternion)
 
 
+END_OPTIONS = "with --to, --to-quaternion, --to-yaw-pitch-roll, --to-tilt-torsion or --to-folds"
 _INSTEAD, _INSTEAD_AT_END = (values.hint(f"instead of --{at}quaternion") for at in ("", "to-"))
 
 
@@ -237,9 +238,6 @@ class EndOptions:
         if all(value is None for value in given):
             return None
         return make_pose(self, "to_", start, to, tool)
-
-
-END_OPTIONS = "with --to, --to-quaternion, --to-yaw-pitch-roll, --to-tilt-torsion or --to-folds"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -74,12 +74,10 @@ class TimeLaw:
         """Return this law with another duration in seconds.
 
         Raises:
-            InputError: The duration is not above zero, or the path has no length.
+            InputError: The duration is not above zero.
         """
         if not 0.0 < duration < math.inf:
             raise InputError(f"the duration must be above zero; got {duration:g} s")
-        if self.duration == 0.0:
-            raise InputError("the path has no length: all its poses are the same")
         slower = duration / self.duration
         return TimeLaw(slower * self.time, self.at, self.rate / slower)
 
@@ -203,7 +201,7 @@ def law_at_speed(
     no largest speed it brakes from the middle of its travel on.
 
     Raises:
-        InputError: There is no move, or the speed or the acceleration is not above zero.
+        InputError: The path has no length, or speed or acceleration is not above zero.
     """
     if not (speed > 0.0 and 0.0 < acceleration < math.inf):
         raise InputError(
@@ -229,7 +227,7 @@ def law_of_shortest_time(
     over the whole path.
 
     Raises:
-        InputError: There is no move, or no limit bounds the acceleration.
+        InputError: The path has no length, or no limit bounds the acceleration.
         MissingExtraError: toppra is not installed.
         NoAnswerError: A weight exceeds the largest force of an actuator at rest, or the path is
             singular.
@@ -248,8 +246,6 @@ def law_of_shortest_time(
     for move in np.flatnonzero(moving):
         squares[move] = _greatest_squares(Bounds(*(each[move] for each in bounds)))
     law = TimeLaw.of(np.sqrt(squares))
-    if not moving.any():
-        return law
     # Between grid points a limit may be exceeded by a little.
     _, number, share, rate, change = law.within_intervals([i / PARTS for i in range(PARTS)])
     finer = Bounds.of(design, JointMotion.along(design, moves, number, share, bodies))
@@ -261,8 +257,8 @@ def law_of_shortest_time(
 def _grid(moves: StraightMoves, points: int) -> tuple[IntArray, FloatArray]:
     """Return number and share of grid points of moves, shape (moves, n) each."""
     count = len(moves.step)
-    if not count:
-        raise InputError("a time law needs a path of at least two poses")
+    if not (moves.step.any() or moves.turn.any()):
+        raise InputError("the path has no length: it needs two poses that differ")
     intervals = max(LEAST_INTERVALS, math.ceil(points / count))
     share = np.linspace(0.0, 1.0, intervals + 1, dtype=np.float64)
     return np.repeat(np.arange(count)[:, None], len(share), axis=1), np.tile(share, (count, 1))

@@ -41,9 +41,8 @@ def inverse_dynamics(
         twist: Velocity of b4 and angular velocity (v; ω), base axes, shape (..., 6), in design
             units and radians per second.
         acceleration: Their rates (v̇; ω̇), shape (..., 6), in design units and radians per s².
-        legs: Whether the bodies of the prototype have their masses, those of bars as in the
-            exported simulation; else the payload of the design, which then stands for platform and
-            tool too, counts alone.
+        legs: Whether the bodies of the prototype have masses, as in the exported simulation; else
+            the payload of the design, which then stands for platform and tool too, counts alone.
 
     Raises:
         InputError: A number is not finite, the rotation is not one, batch axes do not broadcast, or

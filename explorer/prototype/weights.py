@@ -17,18 +17,7 @@ from numpy.typing import NDArray
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
-from explorer.statics.weights import (
-    AXIS_X,
-    CROSS,
-    MOMENT,
-    ROD as ROD_MASS,
-    ROD_CENTRE,
-    SIDE_X,
-    SIDE_Y,
-    SPIN,
-    TOTAL,
-    MovingBodies,
-)
+from explorer.statics.weights import MovingBodies
 
 
 @dataclass(frozen=True)
@@ -119,22 +108,16 @@ def moving_bodies(
     axes, and principal axes along those of their frames; the centre of a cross is at its joint.
     """
     metres = 1e-3 * design.unit_mm
-    axes = Chains.of(design).mounts[:, :, 0]
-    rows = np.zeros((4, 11))
-    for leg, row, axis in zip(LEGS, rows, axes, strict=True):
+    rows: list[list[float]] = []
+    for leg, axis in zip(LEGS, Chains.of(design).mounts[:, :, 0], strict=True):
         cylinder, rod = masses[f"cylinder {leg}"], masses[f"rod {leg}"]
         first = masses[f"{'carriage' if leg in ON_GUIDE else 'cross'} {leg}"]
-        height, of_both = float(cylinder.centre[2]), np.diag(cylinder.inertia + rod.inertia)
-        row[TOTAL] = cylinder.mass + rod.mass
-        if leg in ON_GUIDE:
-            row[TOTAL] += first.mass
-        else:
-            row[CROSS] = first.inertia[0, 0] / metres**2
-        row[ROD_MASS], row[ROD_CENTRE] = rod.mass, -rod.centre[2] / metres
-        row[MOMENT] = cylinder.mass * height / metres
-        row[SIDE_X : SPIN + 1] = of_both / metres**2
-        row[SIDE_X : SIDE_Y + 1] += cylinder.mass * (height / metres) ** 2
-        row[AXIS_X:] = axis
+        slides, turns = (first.mass, 0.0) if leg in ON_GUIDE else (0.0, first.inertia[0, 0])
+        height, back = cylinder.centre[2] / metres, -rod.centre[2] / metres
+        about = np.diag(cylinder.inertia + rod.inertia) / metres**2
+        about = about + cylinder.mass * height**2 * np.array([1.0, 1.0, 0.0])
+        of_leg = slides + cylinder.mass + rod.mass, rod.mass, back, cylinder.mass * height
+        rows.append([*of_leg, *about, turns / metres**2, *axis])
     own = masses["platform"]
     bodies = MovingBodies(legs=rows).with_mass(
         own.mass, own.centre / metres, own.inertia / metres**2

@@ -80,4 +80,4 @@ def test_drives_refuse_a_path_that_is_in_time_already(cli: CommandLine, tmp_path
     table.write_text("time_s,x,y,z\n0,10,5,9\n1,11,5,9\n", encoding="utf-8")
     assert "give the corners alone" in cli.refusal("--path", table, "--duration", "1")
     table.write_text("x,y,z\n10,5,9\n", encoding="utf-8")
-    assert "at least two poses" in cli.refusal("--path", table, "--duration", "1")
+    assert "two poses that differ" in cli.refusal("--path", table, "--duration", "1")

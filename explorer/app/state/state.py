@@ -34,8 +34,6 @@ from explorer.singularity.colours import WARN_SHARE
 Joints = tuple[float, float, float, float, float, float]
 Folds = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
-# The fields of a design on which its paths depend.
-_OF_PATHS = tuple({*Design.__struct_fields__} - {"payload", "actuators"})
 # Difference of the entries of rotation matrices up to which they are the same but for rounding.
 SAME_ROTATION = 1e-12
 POINTS: dict[Point, str] = {"b4": "b4", "tool": "the tool"}
@@ -263,12 +261,12 @@ class State:
 
         It stays while a payload and actuators are chosen for it.
         """
-        journey = self.paths.journey
-        if journey is None or journey.design == self.design:
+        journey, new = self.paths.journey, self.design
+        if journey is None or journey.design == new:
             return journey
-        if any(getattr(journey.design, name) != getattr(self.design, name) for name in _OF_PATHS):
-            return None
-        return replace(journey, design=self.design)
+        carrying = {"payload": new.payload, "actuators": new.actuators}
+        is_for_it = msgspec.structs.replace(journey.design, **carrying) == new
+        return replace(journey, design=new) if is_for_it else None
 
     @property
     def warn_below(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from explorer.app.features.feature import Services, html_of, show_html
-from explorer.app.features.paths.work import DRIVES_FEED, DrivesDrawing, DrivesFeed
+from explorer.app.features.paths.work import DRIVES_FEED, DrivesDrawing
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Updates
@@ -22,7 +22,7 @@ class DrivesPanel:
     """The time that the path takes, and what it then asks of the actuators."""
 
     def __init__(self, services: Services, controls: Controls) -> None:
-        self._feed: DrivesFeed = services.get(DRIVES_FEED)
+        self._feed = services.get(DRIVES_FEED)
         controls.dropdown(
             "Speeds and forces",
             "Compute what the path asks of the actuators if the platform rests at every corner: in "

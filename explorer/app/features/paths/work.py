@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.feed import feed_of
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.export.drawings.drives import force_speed_chart, time_charts
@@ -47,5 +47,4 @@ def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:
     return DrivesDrawing(tuple(drive_blocks(found)), charts)
 
 
-DrivesFeed: TypeAlias = Feed[DrivesRequest, DrivesDrawing | ExplorerError]
 DRIVES_FEED = feed_of(draw_drives, lambda frame: request_for(frame.state))
