@@ -170,15 +170,8 @@ def check_limits(design: Design, moves: StraightMoves) -> None:
 
 def drive_blocks(drives: Drives) -> Iterator[block.Block]:
     """Yield what a path asks of the actuators, and the least motor."""
-    force, steady, power, speed = (
-        block.Number(drives.least_motor[name], f" {unit}")
-        for name, unit in (
-            ("peak_force", "N"),
-            ("rms_force", "N"),
-            ("peak_power", "W."),
-            ("peak_speed", "mm/s"),
-        )
-    )
+    units = (" mm/s", " N", " N", " W.")
+    speed, force, steady, power = map(block.Number, [*drives.least_motor.values()][:4], units)
     words = ("A motor that holds all this needs at least ", force, " peak, ", steady)
     yield block.Statement(
         "Least motor",
@@ -186,20 +179,14 @@ def drive_blocks(drives: Drives) -> Iterator[block.Block]:
         hint="The largest of the six actuators, in each number",
     )
     used = [*map(_binding_words, drives.binding)]
-    columns = (
-        ("peak speed, mm/s", 4),
-        ("peak force, N", 4),
-        ("RMS force, N", 4),
-        ("peak power, W", 3),
-        ("mean power, W", 3),
-    )
+    titles = "peak speed, mm/s", "peak force, N", "RMS force, N", "peak power, W", "mean power, W"
     yield block.Table(
         f"Actuators along the path, {drives.law.duration:.4g} s",
         (
             block.Names("actuator", JOINTS),
             *(
-                block.Column(title, six.tolist(), digits=digits)
-                for (title, digits), six in zip(columns, drives.figures, strict=True)
+                block.Column(title, six.tolist(), digits=4)
+                for title, six in zip(titles, drives.figures, strict=True)
             ),
             *((block.Names("most used limit", used),) if any(drives.binding) else ()),
         ),

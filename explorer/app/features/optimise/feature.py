@@ -157,9 +157,7 @@ class OptimisePanel:
             "The acceleration from rest, in every direction, that the limits of forces and moments "
             "must allow with the payload in the required box, in m/s²; 0 for no demand.",
             step=0.1,
-            visible=lambda state: bool(
-                state.design.payload.mass_kg or _request(state).acceleration
-            ),
+            visible=lambda s: max(s.design.payload.mass_kg, _request(s).acceleration) > 0.0,
         )
         self._add_number(
             "tilt",
