@@ -203,7 +203,7 @@ class Session:
         if isinstance(item.change, HistoryMove):
             history = item.change.move(self._history)
             undone = self._history.steps[history.at + 1 : self._history.at + 1]
-            self._hold(*restore(history, self._state))
+            self._replace(*restore(history, self._state))
             # The first step of each other client.
             for who, words in {each.who: each.words for each in undone[::-1]}.items():
                 if item.who is not None and who not in (None, item.who):
@@ -215,9 +215,9 @@ class Session:
             return
         event = UserAction(action, item.key, item.stamp, press, item.who)
         state = event.apply(self._state)
-        self._hold(state, self._history.record(event, state))
+        self._replace(state, self._history.record(event, state))
 
-    def _hold(self, state: State, history: History) -> None:
+    def _replace(self, state: State, history: History) -> None:
         # The history first: a thread that sees the new state finds its step.
         self._history = history
         self._state = state
