@@ -42,6 +42,7 @@ from .optimise.defaults import make_problem as make_problem
 from .optimise.solver import optimise_design as optimise_design
 from .paths.planning import plan_path as plan_path
 from .prototype.assembly import make_prototype as make_prototype
+from .prototype.dynamics import inverse_dynamics as inverse_dynamics
 from .singularity.ellipsoids import performance as performance
 from .singularity.nearest import nearest_singularities as nearest_singularities
 from .singularity.strata import stratum as stratum
@@ -55,6 +56,7 @@ from .statics.forces import (
     largest_force as largest_force,
     strut_bending as strut_bending,
 )
+from .statics.motion import joint_accelerations as joint_accelerations, joint_rates as joint_rates
 from .statics.reactions import largest_payload as largest_payload, reactions as reactions
 from .sweep.results import load_results as load_results
 from .sweep.run import run_study as run_study

@@ -212,6 +212,7 @@ def make_pose(
     return Pose((x, y, z), pose.quaternion)
 
 
+END_OPTIONS = "with --to, --to-quaternion, --to-yaw-pitch-roll, --to-tilt-torsion or --to-folds"
 _INSTEAD, _INSTEAD_AT_END = (values.hint(f"instead of --{at}quaternion") for at in ("", "to-"))
 
 

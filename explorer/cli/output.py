@@ -245,3 +245,9 @@ def _table(block: kinds.Table) -> str:
         columns.append([kinds.head_of(column), *cells])
         align += "<" if isinstance(column, kinds.Names) else ">"
     return table(list(zip(*columns, strict=True)), align)
+
+
+def end_lines(design: Design, start: Pose, end: Pose, tool: Triple | None) -> Iterator[str]:
+    """Yield the two ends of a move or a path."""
+    for name, pose in (("from", start), ("to", end)):
+        yield from (name, *indent(pose_table(design, pose, tool)))

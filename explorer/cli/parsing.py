@@ -27,7 +27,7 @@ _HELP = ("-h", "--help")
 _MODULES = {
     **dict.fromkeys(("inverse", "forward", "singularity"), "kinematics"),
     **dict.fromkeys(("forces", "accuracy", "budget"), "statics"),
-    **dict.fromkeys(("interference", "path"), "moves"),
+    **dict.fromkeys(("path", "drives"), "paths"),
     "orientation": "workspace",
     **dict.fromkeys(("serve", "report", "screenshot"), "page"),
 }

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from explorer.errors import NoAnswerError
 from explorer.mechanism.configuration import Configuration
@@ -21,10 +20,9 @@ from explorer.mechanism.design import JOINTS, STRUT_ROWS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.prototype.chains import BODIES, Chains
-from explorer.prototype.weights import Mass, machine_weights, total_mass
+from explorer.prototype.weights import Mass, moving_bodies
 from explorer.statics.compliance import softness_with_struts
-from explorer.statics.forces import actuator_forces, twists_of_actuators
+from explorer.statics.forces import forces_of, twists_of_actuators
 from explorer.statics.weights import carry
 from explorer.workspace.limits.table import joint_ranges
 
@@ -33,8 +31,6 @@ FREQUENCY = 200.0
 
 # Stiffness of what a design leaves rigid, over that of its stiffest spring.
 RIGID = 10.0
-# Share of the reach that the platform moves by for its velocities.
-STEP = 1e-5
 
 
 class Servos(NamedTuple):
@@ -126,59 +122,19 @@ def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> S
     Raises:
         NoAnswerError: The home pose is singular.
     """
-    inertia = np.diag(joint_inertia(design, with_payload(design, masses)))
-    home = design.home_pose
-    wrench = carry(Configuration.at(design, home), machine_weights(design, masses)).wrench
-    weights = actuator_forces(design, home.position, home.rotation, wrench)
+    home, metres = Configuration.at(design, design.home_pose), 1e-3 * design.unit_mm
+    twists = twists_of_actuators(home).T
+    if not np.isfinite(twists).all():
+        raise NoAnswerError(
+            "the home pose is singular, so that no servos hold it; choose another home"
+        )
+    # At rest, and with an acceleration of each actuator.
+    bodies, accelerations = moving_bodies(design, masses), np.vstack([np.zeros(6), twists])
+    held = forces_of(home, carry(home, bodies, acceleration=accelerations).wrench)
+    weights, inertia = held[0], np.diag(held[1:] - held[0]) / metres
     stiffness = servo_stiffness(design) if elastic else None
     forces = weights if stiffness is None else np.zeros(6)
     if stiffness is None:
         stiffness = FREQUENCY**2 * inertia
     rotors = np.maximum(inertia, stiffness / FREQUENCY**2)
     return Servos(stiffness, 2.0 * np.sqrt(stiffness * rotors), rotors, weights, forces)
-
-
-def with_payload(design: Design, masses: Mapping[str, Mass]) -> Mapping[str, Mass]:
-    """Return the masses of the bodies, the design's payload being part of the platform."""
-    centre = 1e-3 * design.unit_mm * np.array(design.payload.centre)
-    payload = Mass(design.payload.mass_kg, centre, np.zeros((3, 3)))
-    return {**masses, "platform": total_mass([masses["platform"], payload])}
-
-
-def joint_inertia(design: Design, masses: Mapping[str, Mass]) -> FloatArray:
-    """Return the inertia of all bodies at home per joint rates, shape (6, 6), in kg.
-
-    The kinetic energy is half of rates @ inertia @ rates, with rates in metres per second; masses
-    are those of bodies in their own frames, in metres and kilograms.
-
-    Raises:
-        NoAnswerError: The home pose is singular.
-    """
-    home, metres = design.home_pose, 1e-3 * design.unit_mm
-    twists = twists_of_actuators(Configuration.at(design, home)).T
-    if not np.isfinite(twists).all():
-        raise NoAnswerError(
-            "the home pose is singular, so that no servos hold it; choose another home"
-        )
-    sizes = np.abs(twists * np.repeat([1.0 / design.reach, 1.0], 3)).max(axis=1)
-    steps = STEP / sizes[:, None]
-    chains = Chains.of(design)
-    ahead, behind = (
-        chains.places_at(
-            np.array(home.position) + sign * steps * twists[:, :3],
-            Rotation.from_rotvec(sign * steps * twists[:, 3:]).as_matrix() @ home.rotation,
-        )
-        for sign in (1.0, -1.0)
-    )
-    here = chains.places_at(home.position, home.rotation)
-    inertia = np.zeros((6, 6))
-    for name, mass in masses.items():
-        index = BODIES.index(name)
-        speeds = (ahead.origin - behind.origin)[:, index] / (2.0 * steps)
-        turn = ahead.rotation[:, index] @ np.swapaxes(behind.rotation[:, index], -1, -2)
-        spin = Rotation.from_matrix(turn).as_rotvec() / (2.0 * steps * metres)
-        axes = here.rotation[index]
-        speeds += np.cross(spin, axes @ mass.centre)
-        spin = spin @ axes
-        inertia += mass.mass * speeds @ speeds.T + spin @ mass.inertia @ spin.T
-    return inertia

@@ -29,18 +29,15 @@ from numpy.typing import ArrayLike
 
 from explorer import __version__
 from explorer.errors import InputError
-from explorer.export.servos import droop_text, servos_of, strokes_of, with_payload
+from explorer.export.servos import droop_text, servos_of, strokes_of
 from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.machine import Guide
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Chains
 from explorer.prototype.imperfect import ImperfectMachine
-from explorer.prototype.weights import BALL, ROD, Mass, bar_masses, leg_radii
+from explorer.prototype.weights import BALL, DENSITY, ROD, Mass, bar_masses, leg_radii, with_payload
 from explorer.statics.accuracy import SOURCES, source_errors
 from explorer.statics.compliance import is_elastic
-
-DENSITY = 1240.0
-"""The default density of the bodies, in kg/m³: that of printed PLA."""
 
 SIMULATION_BODIES = tuple(name.replace(" ", "_") for name in BODIES)
 """The bodies with mass, and the base."""
@@ -142,6 +139,12 @@ class SimulationModel:
         self.readings[list(ACTUATED)] -= machine.encoder_offsets
         self.servos = servos_of(design, self.masses, elastic=not self.is_perfect)
         self.masses = with_payload(design, self.masses)
+        least, middle, most = np.linalg.eigvalsh(self.masses["platform"].inertia).tolist()
+        if most > (least + middle) * (1.0 + 1e-9):
+            raise InputError(
+                "no body has the moments of inertia of the payload, of which one exceeds the sum "
+                "of the others; correct payload.inertia_kg_mm2"
+            )
         self.strokes = strokes_of(design, joints[list(ACTUATED)])
 
     @property

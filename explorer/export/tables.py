@@ -8,7 +8,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import JOINTS
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.paths.drives import Drives
 from explorer.paths.trajectory import Trajectory
 from explorer.statics.accuracy import IS_TILT, SOURCES
 from explorer.statics.budget import PARTS, SourceCosts
@@ -20,13 +24,38 @@ def trajectory_csv(trajectory: Trajectory) -> str:
     The header has the unit of each length, such as "l1 [10 mm]". Numbers round-trip to the
     last bit.
     """
-    columns = [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
-    head = ["time_s", *length_heads((*JOINTS, *"xyz"), trajectory.unit_mm)]
-    head += ["qw", "qx", "qy", "qz"]
-    if trajectory.tool_position is not None:
-        columns.append(trajectory.tool_position)
-        head += length_heads([f"tool_{axis}" for axis in "xyz"], trajectory.unit_mm)
+    head, columns = _columns(trajectory, trajectory.unit_mm)
     return _csv(head, np.column_stack(columns).tolist())
+
+
+def drives_csv(drives: Drives, trajectory: Trajectory) -> str:
+    """Return what a path asks of the actuators as CSV: a header, then a line per sample.
+
+    The trajectory of the same path and time law gives the samples. Times are in s, lengths in mm,
+    speeds in mm/s, forces in N and powers in W, as the header says.
+    """
+    head, columns = _columns(trajectory, 1.0)
+    for name, unit in (("speed", "mm/s"), ("force", "N"), ("power", "W")):
+        head += [f"{joint} {name} [{unit}]" for joint in JOINTS]
+        columns += [np.interp(trajectory.time, drives.time, v) for v in getattr(drives, name).T]
+    return _csv(head, np.column_stack(columns).tolist())
+
+
+def _columns(trajectory: Trajectory, unit_mm: float) -> tuple[list[str], list[FloatArray]]:
+    """Return headings and columns of a trajectory, with a unit of lengths."""
+    scale, tool = trajectory.unit_mm / unit_mm, trajectory.tool_position
+    columns = [trajectory.time, scale * trajectory.joints, scale * trajectory.position]
+    columns += [trajectory.quaternion, *([] if tool is None else [scale * tool])]
+    head = ["time_s", *length_heads((*JOINTS, *"xyz"), unit_mm), "qw", "qx", "qy", "qz"]
+    return head + length_heads([f"tool_{a}" for a in "xyz" if tool is not None], unit_mm), columns
+
+
+def corners_csv(poses: Iterable[Pose], tool: Triple | None = None) -> str:
+    """Return corners of a path as CSV, in design units: positions of the tool, or of b4 if None."""
+    name = "" if tool is None else "tool_"
+    head = [*(f"{name}{axis}" for axis in "xyz"), "qw", "qx", "qy", "qz"]
+    places = ((p.position if tool is None else tool_position(p, tool), p) for p in poses)
+    return _csv(head, ((*position, *pose.quaternion) for position, pose in places))
 
 
 TOLERANCE_COLUMNS = (
@@ -55,8 +84,8 @@ def tolerance_csv(costs: SourceCosts) -> str:
 
 def length_heads(names: Iterable[str], unit_mm: float) -> list[str]:
     """Return headings of lengths in design units, such as "l1 [10 mm]"."""
-    unit = repr(unit_mm).removesuffix(".0")
-    return [f"{name} [{unit} mm]" for name in names]
+    unit = "mm" if unit_mm == 1.0 else f"{repr(unit_mm).removesuffix('.0')} mm"
+    return [f"{name} [{unit}]" for name in names]
 
 
 def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:

@@ -16,14 +16,16 @@ EXTRAS = {
     "planning": ("paths that are not straight in the folds", ("ompl",)),
     "screenshot": ("pictures and PDF files", ("playwright",)),
     "study": ("studies", ("pyarrow",)),
+    "timing": ("paths in the shortest time", ("toppra",)),
 }
 """What needs each extra, in the plural, and the packages that it installs."""
+# OMPL and toppra have packages for Linux alone.
+LINUX_ALONE = ("planning", "timing")
 
 
 def install_command(extra: str) -> str:
     """Return the command that installs an extra, in a checkout of this project; "" for none."""
-    # OMPL has packages for Linux alone.
-    is_offered = extra != "planning" or sys.platform == "linux"
+    is_offered = extra not in LINUX_ALONE or sys.platform == "linux"
     return f'pip install ".[{extra}]"' if is_offered else ""
 
 

@@ -148,6 +148,18 @@ class StraightMoves:
         at = self.start[number] + share[..., None] * self.step[number]
         return at - tool_offset(rotation, self.tool), rotation
 
+    def slopes(self, number: IntArray, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return twist and acceleration of b4 by the share of moves, (..., 6) each.
+
+        At a rate of the share the motion has rate × twist and rate² × acceleration, and with a
+        change of the rate also change × twist. The rotations are those of `poses`.
+        """
+        turn = self.turn[number]
+        swing = np.cross(turn, tool_offset(rotation, self.tool))
+        twist = np.concatenate([self.step[number] - swing, turn], axis=-1)
+        inwards = -np.cross(turn, swing)
+        return twist, np.concatenate([inwards, np.zeros(turn.shape)], axis=-1)
+
 
 def poses_between(
     start: Pose, end: Pose, shares: ArrayLike, tool: ArrayLike | None = None

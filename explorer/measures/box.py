@@ -24,8 +24,8 @@ from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.statics import compliance, slopes
 from explorer.statics.accuracy import ToolError, actuator_errors, worst_errors
 from explorer.statics.forces import SINGULAR
-from explorer.statics.reactions import Reactions, limit_shares, reactions
-from explorer.statics.weights import design_weights, payload_wrench
+from explorer.statics.reactions import Reactions, largest_accelerations, limit_shares, reactions
+from explorer.statics.weights import MovingBodies, payload_wrench
 from explorer.workspace.least_clearance import node_measures
 
 BOX_NODES = 9
@@ -129,7 +129,7 @@ class BoxStatics:
     @cached_property
     def reactions(self) -> Reactions:
         """The reactions to the weight of the payload."""
-        return reactions(self.configuration, np.zeros(6), design_weights(self.design))
+        return reactions(self.configuration, np.zeros(6), MovingBodies().with_payload(self.design))
 
     @cached_property
     def errors(self) -> ToolError:
@@ -167,6 +167,11 @@ class BoxStatics:
         """The bending moments of the struts at the nodes, shape (n, 2), in N × unit."""
         return self.reactions.bending + self.reactions.spread[:, slopes.BENDING]
 
+    @cached_property
+    def accelerations(self) -> FloatArray:
+        """The largest accelerations by each part at the nodes, shape (n, 10), in m/s²."""
+        return largest_accelerations(self.configuration)
+
     def worst(self, values: FloatArray) -> float:
         """Return the largest of values at the nodes; infinite if the box has singular positions."""
         return float(values.max()) if self.is_regular else np.inf
@@ -195,6 +200,14 @@ class BoxStatics:
         parts = np.divmod(np.arange(10 * len(self.positions)), 10)
         largest, by = slopes.share_slopes(self.design, self.rotation, twists, parts, limits)
         return _by_name(by[largest.argmax()])
+
+    def acceleration_slopes(self) -> Mapping[str, float]:
+        """Return those of the least of the largest accelerations, as `slopes_at_worst` does."""
+        if not self.is_regular:
+            return {}
+        node, part = np.divmod([self.accelerations.argmin()], 10)
+        worst, parts = self.positions[node], (np.zeros_like(part), part)
+        return _by_name(slopes.acceleration_slopes(self.design, worst, self.rotation, parts)[1][0])
 
 
 def _by_name(derivatives: FloatArray) -> Mapping[str, float]:

@@ -11,10 +11,17 @@ import numpy as np
 
 from explorer.measures.box import BOX_NODES, BoxStatics
 from explorer.measures.measure import Case, Measure, Place, Sense
+from explorer.measures.workspace import AtNodes
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.statics import slopes
-from explorer.statics.reactions import largest_payload, part_limits
+from explorer.statics.reactions import largest_accelerations, largest_payload, part_limits
+
+ACCELERATION = (
+    "largest acceleration (1 g is 9.81 m/s²; below 0 where the payload is not held) from rest in "
+    "every direction, without turning, that the payload's weight and force leave within the limits "
+    "of actuators, struts and guide"
+)
 
 ELSEWHERE: tuple[Place, ...] = ("compare", "studies", "report")
 
@@ -36,6 +43,21 @@ def loads() -> Iterable[Measure]:
         needs=("is_loaded", "is_limited"),
         places=(*ELSEWHERE, "workspace"),
     )
+    yield AtNodes(
+        "worst_acceleration",
+        "worst acceleration at nodes",
+        f"Least value at the nodes of the workspace of the {ACCELERATION}",
+        lambda case: _least(largest_accelerations(case.node_indices)),
+        unit="m/s²",
+        needs=("has_mass", "is_limited"),
+        places=("compare", "studies"),
+    )
+
+
+def _least(accelerations: FloatArray) -> float:
+    """Return the least acceleration; NaN where a limit is exceeded whatever the acceleration."""
+    least = float(accelerations.min(initial=math.inf))
+    return least if math.isfinite(least) else math.nan
 
 
 def _loads_at(*, is_home: bool) -> Iterator[Measure]:
@@ -76,6 +98,16 @@ def _loads_at(*, is_home: bool) -> Iterator[Measure]:
         ("is_limited",),
         unit="kg",
         sense="more",
+    )
+    yield measure(
+        "acceleration",
+        "acceleration",
+        f"The {ACCELERATION}",
+        lambda statics: _least(statics.accelerations) if statics.is_regular else math.nan,
+        ("has_mass", "is_limited"),
+        unit="m/s²",
+        sense="more",
+        gradient=BoxStatics.acceleration_slopes,
     )
     yield measure(
         "largest_bending",

@@ -205,7 +205,7 @@ Place = Literal["compare", "optimise", "studies", "workspace", "report"]
 `explorer workspace`, or the report."""
 
 Sense = Literal["more", "less"]
-Unit = Literal["", "°", "share", "N m", "kg", "mm/N"]
+Unit = Literal["", "°", "share", "N m", "kg", "m/s²", "mm/N"]
 Cost = Literal["low", "high"]
 NEEDS: Mapping[str, tuple[str, Callable[[Case], bool]]] = {
     "box": ("required box", lambda case: case.box is not None),
@@ -214,6 +214,7 @@ NEEDS: Mapping[str, tuple[str, Callable[[Case], bool]]] = {
         "payload or force at the tool",
         lambda case: bool(case.design.payload.mass_kg or case.design.payload.force_n),
     ),
+    "has_mass": ("mass of the payload", lambda case: case.design.payload.mass_kg > 0.0),
     "is_limited": ("limit of actuators, struts or guide", lambda case: has_limits(case.design)),
     "limits_actuators": (
         "limit of the actuators",

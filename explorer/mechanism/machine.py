@@ -67,20 +67,25 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         centre: Centre of mass in the platform frame, in design units.
         force_n: Largest force of the process, which acts at the tool point in any direction, in
             newtons.
+        inertia_kg_mm2: Moments of inertia about the centre along the platform's axes, which are
+            taken as principal axes, in kg mm²; zeros for a point mass.
 
     Raises:
-        DesignError: The mass or the force is negative, or a value is not finite.
+        DesignError: The mass, the force or a moment is negative, or a value is not finite.
     """
 
     mass_kg: float = 0.0
     centre: Triple = (0.0, 0.0, 0.0)
     force_n: float = 0.0
+    inertia_kg_mm2: Triple = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        # The weights of parts are payloads too, and those of a machine of kilometres are large.
-        _set(self, "mass_kg", not_negative("payload.mass_kg", self.mass_kg, STIFFEST))
+        _set(self, "mass_kg", not_negative("payload.mass_kg", self.mass_kg))
         _set(self, "centre", tuple(numbers("payload.centre", self.centre, 3)))
         _set(self, "force_n", not_negative("payload.force_n", self.force_n))
+        name = "payload.inertia_kg_mm2"
+        moments = numbers(name, self.inertia_kg_mm2, 3, STIFFEST)
+        _set(self, "inertia_kg_mm2", tuple(not_negative(name, each, STIFFEST) for each in moments))
 
     @property
     def weight_n(self) -> float:
@@ -88,12 +93,21 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.mass_kg * STANDARD_GRAVITY
 
 
+def or_infinite(six: Six | None) -> FloatArray:
+    """Return six limits or stiffnesses as an array (6,); infinite if there are none."""
+    return np.array(six or (math.inf,) * 6)
+
+
 class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Data of the six actuators, each six numbers in the order of `JOINTS`.
 
     Attributes:
-        push_n: Largest force that increases the joint's value, in newtons; None for no limit.
+        push_n: Largest force that increases the joint's value, if only for a moment, in newtons;
+            None for no limit.
         pull_n: Largest force that decreases it, in newtons; None for the same as `push_n`.
+        continuous_n: Largest root-mean-square force over a motion, in newtons; None for no limit.
+        speed_mm_s: Largest speed, in millimetres per second; None for no limit.
+        acceleration_mm_s2: Largest acceleration, in millimetres per s²; None for no limit.
         error_mm: Largest positioning error to either side, in millimetres.
         stiffness_n_mm: Stiffness, in newtons per millimetre; None for rigid actuators.
 
@@ -106,11 +120,14 @@ class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pull_n: Six | None = None
     error_mm: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     stiffness_n_mm: Six | None = None
+    continuous_n: Six | None = None
+    speed_mm_s: Six | None = None
+    acceleration_mm_s2: Six | None = None
 
     def __post_init__(self) -> None:
-        for name in ("push_n", "pull_n", "stiffness_n_mm"):
+        for name in self.__struct_fields__:
             values = getattr(self, name)
-            if values is not None:
+            if values is not None and name != "error_mm":
                 field = f"actuators.{name}"
                 most = STIFFEST if name == "stiffness_n_mm" else MOST
                 given = numbers(field, values, 6, most)
@@ -121,8 +138,7 @@ class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
         """Largest push and largest pull, each of shape (6,), in newtons; infinite for no limit."""
-        push = self.push_n or (math.inf,) * 6
-        return np.array(push), np.array(self.pull_n or push)
+        return or_infinite(self.push_n), or_infinite(self.pull_n or self.push_n)
 
 
 class Struts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -220,7 +220,7 @@ def _of_margins(intervals: Intervals) -> Iterator[Conflict]:
     required, least = demands.required_box, problem.start.limits.margin
     if required is None:
         return
-    is_loaded = demands.held or demands.error or demands.deflection
+    is_loaded = demands.held or demands.error or demands.deflection or demands.acceleration
     needs_regular = is_loaded or problem.objective in problems.OF_THE_MACHINE
     corners, shifts = np.transpose(required), intervals.of(*problems.SHIFTS)
     rounding = SINGULAR * float(np.linalg.norm(corners[:, 1] - corners[:, 0]))

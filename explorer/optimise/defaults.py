@@ -47,6 +47,7 @@ def make_problem(
     held: bool = False,
     error: float | None = None,
     deflection: float | None = None,
+    acceleration: float | None = None,
     tilt: float | None = None,
     free: Iterable[str] = (),
     bounds: Iterable[problem.Variable] = (),
@@ -96,6 +97,7 @@ def make_problem(
             held=held,
             error=error,
             deflection=deflection,
+            acceleration=acceleration,
             tilt=tilt,
         ),
     )

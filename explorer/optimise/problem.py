@@ -82,7 +82,8 @@ AZIMUTHS = 12
 
 MOST_TILT = 90.0
 # The demands that are positive numbers.
-POSITIVE = ("volume", "reach", "clearance", "stroke_ratio", "error", "deflection", "tilt")
+SIZES = ("volume", "reach", "clearance", "stroke_ratio")
+POSITIVE = (*SIZES, "error", "deflection", "acceleration", "tilt")
 
 
 class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -108,6 +109,8 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
             design units.
         deflection: Largest displacement of the tool under the design's load over the required box,
             in design units.
+        acceleration: Least of the largest accelerations from rest in every direction over the
+            required box, in m/s².
     """
 
     volume: float | None = None
@@ -120,6 +123,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     held: bool = False
     error: float | None = None
     deflection: float | None = None
+    acceleration: float | None = None
     tilt: float | None = None
 
     def __post_init__(self) -> None:
@@ -345,13 +349,14 @@ def _check_demands(problem: Problem) -> None:
 def _check_statics(problem: Problem) -> None:
     demands, design = problem.demands, problem.start
     needs_load = demands.held or problem.objective == "smallest-load"
+    moves = demands.acceleration is not None
     needs_error = demands.error is not None or problem.objective == "smallest-error"
     bends = demands.deflection is not None or problem.objective == "smallest-deflection"
-    needs_box = needs_load or needs_error or bends or demands.tilt is not None
+    needs_box = needs_load or needs_error or bends or moves or demands.tilt is not None
     if needs_box and demands.required_box is None:
         raise InputError(
-            "loads, errors, deflections and tilts are demanded over a required box, and none is "
-            "given"
+            "loads, errors, deflections, accelerations and tilts are demanded over a required box, "
+            "and none is given"
         )
     if demands.tilt is not None and not demands.tilt < MOST_TILT:
         raise InputError(f"the tilt demanded must be below {MOST_TILT:g}°; got {demands.tilt:g}°")
@@ -359,7 +364,9 @@ def _check_statics(problem: Problem) -> None:
         raise StartError(
             "the design has no load: give its payload a mass, or a force of any direction", NO_LOAD
         )
-    if needs_load and np.isinf(part_limits(design)).all():
+    if moves and not design.payload.mass_kg:
+        raise StartError("the design has no mass to accelerate: give its payload a mass", NO_LOAD)
+    if (needs_load or moves) and np.isinf(part_limits(design)).all():
         raise StartError(
             "the design limits neither its actuators nor its struts nor its guide: give a limit "
             "of forces or moments",

@@ -26,7 +26,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, lengths_of
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.statics.forces import load_array, twists_of_actuators
 from explorer.statics.reactions import LIMITED, Reactions, limit_shares, reactions
-from explorer.statics.weights import Weights, design_weights
+from explorer.statics.weights import MOMENT, ROD, ROD_CENTRE, TOTAL, MovingBodies
 
 # Difference of bound and largest share, over that share, at which halving ends; and rounding.
 TOLERANCE, ROUNDING = 0.02, 1e-9
@@ -76,13 +76,13 @@ class DemandedLoad:
 
     design: Design
     load: FloatArray
-    weights: Weights
+    weights: MovingBodies
 
     @staticmethod
-    def of(design: Design, load: ArrayLike, weights: Weights | None = None) -> DemandedLoad:
+    def of(design: Design, load: ArrayLike, weights: MovingBodies | None = None) -> DemandedLoad:
         """Return a load on a design; arguments and errors are those of `path_loads`."""
         six = load_array(load)
-        return DemandedLoad(design, six, design_weights(design) if weights is None else weights)
+        return DemandedLoad(design, six, weights or MovingBodies().with_payload(design))
 
     def shares(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         """Return the shares of the limits in poses, shape (..., 12), in the order of `LIMITED`.
@@ -152,19 +152,19 @@ class DemandedLoad:
         An interval is given by the number of its move, the share of that in its middle, and its
         half as a share, shape (n,) each.
         """
-        design, masses = self.design, self.weights
+        design, (platform, legs) = self.design, self.weights.arrays
         position, rotation = moves.poses(number, share)
         poses = Configuration(design, position, rotation)
         middle = self._reactions(poses)
         forces = np.abs(middle.actuators) + middle.spread[:, :6]
         lengths, turn = poses.joints, moves.turn[number]
-        bodies, gravity = masses.on_platform, STANDARD_GRAVITY * math.hypot(*design.gravity)
+        mass, gravity = float(platform[3, 3]), STANDARD_GRAVITY * math.hypot(*design.gravity)
         joints = design.platform_points[[0, 1, 1, 2, 2, 3]]
-        points = [*joints, design.tool.position, *(body.centre for body in bodies)]
+        points = [*joints, design.tool.position, platform[:3, 3] / (mass or 1.0)]
         arms = np.array(points) @ np.swapaxes(rotation, 1, 2)
         twists = np.swapaxes(twists_of_actuators(poses), 1, 2)[:, :, None]
         with np.errstate(invalid="ignore", divide="ignore"):
-            # Speeds of the points for unit rates of the actuators, shape (n, 6, 7 + bodies).
+            # Speeds of the points for unit rates of the actuators, shape (n, 6, 8).
             speeds = lengths_of(twists[..., :3] + np.cross(twists[..., 3:], arms[:, None]))
             # How far the joints' points move, the platform turns, and the legs turn.
             swing = np.cross(turn[:, None], arms[:, :6] - rotate(rotation, moves.tool)[:, None])
@@ -176,14 +176,13 @@ class DemandedLoad:
             turns[:, LENGTH_ROWS] += tilt
             asked = speeds[:, :, :6] * turns[:, None]
             # Loads that keep their direction in the base turn in the axes of the platform.
-            sizes = [lengths_of(self.load[:3]), *(body.mass_kg * gravity for body in bodies)]
-            change = rotate(asked, forces) + angle * (speeds[:, :, 6:] @ np.array(sizes))
+            sizes = np.array([lengths_of(self.load[:3]), mass * gravity])
+            change = rotate(asked, forces) + angle * (speeds[:, :, 6:] @ sizes)
             change += angle * lengths_of(twists[:, :, 0, 3:]) * lengths_of(self.load[3:])
             # The weights of the legs act at their joints, partly across the legs.
-            rods, cylinders = np.array(masses.rods), np.array(masses.cylinders)
-            leaning = np.abs(cylinders * masses.cylinder_centres - rods * masses.rod_centres)
+            leaning = np.abs(legs[:, MOMENT] - legs[:, ROD] * legs[:, ROD_CENTRE])
             leaning = gravity * leaning / lengths[:, LENGTH_ROWS]
-            standing = gravity * (rods + cylinders + np.array(masses.carriages))
+            standing = gravity * legs[:, TOTAL]
             tilting = 2.0 * leaning * tilt
             change += rotate(speeds[:, :, LENGTH_ROWS], tilting + angle * (leaning + standing))
             sums = asked.sum(axis=2)
@@ -192,7 +191,7 @@ class DemandedLoad:
             longer, along = way[:, STRUT_ROWS], forces[:, GUIDE_ROWS] + standing[1:3]
             bending = change[:, GUIDE_ROWS] * (lengths[:, STRUT_ROWS] + longer) + along * longer
             across = change[:, STRUT_ROWS]
-            if masses.has_legs:
+            if standing.any():
                 across = across + tilting[:, 1:3] + forces[:, STRUT_ROWS] * tilt[:, 1:3]
             widening = np.concatenate([change, bending, across, bending], axis=1)
         is_bounded = (most < 1.0) & np.isfinite(widening).all(axis=1, keepdims=True)
@@ -210,7 +209,7 @@ def path_loads(
     load: ArrayLike,
     *,
     tool: Triple | None = None,
-    weights: Weights | None = None,
+    weights: MovingBodies | None = None,
 ) -> PathLoads:
     """Return the shares of the limits that a load uses over a path of straight moves.
 

@@ -32,7 +32,7 @@ from explorer.paths import search
 from explorer.paths.loads import ROUNDING, DemandedLoad
 from explorer.singularity.strata import incidences
 from explorer.statics.reactions import PART_NAMES
-from explorer.statics.weights import Weights
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.limits.quantities import valid_rows
 from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
 from explorer.workspace.limits.valid_poses import Rules, violations
@@ -93,7 +93,7 @@ def plan_path(
     seed: int = 0,
     tool: Triple | None = None,
     load: ArrayLike | None = None,
-    weights: Weights | None = None,
+    weights: MovingBodies | None = None,
 ) -> PlannedPath:
     """Return a path from a pose to another that keeps limits, margins and clearances.
 

@@ -1,7 +1,8 @@
 """Trajectories: paths over time, with the joints.
 
-The fastest actuator has the given speed all along, so no other is faster. Samples are evenly
-spaced in time and lie on the path exactly; their joints come from inverse kinematics.
+The fastest actuator has the given speed all along, so no other is faster, unless a time law of
+`explorer.paths.time_law` says otherwise. Samples are evenly spaced in time and lie on the path
+exactly; their joints come from inverse kinematics.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose, quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.paths.time_law import TimeLaw
 
 # The default speed of the fastest actuator, as a share of the reach per second.
 DEFAULT_SPEED = 0.1
@@ -65,6 +67,7 @@ def trajectory(
     speed: float | None = None,
     samples: int = DEFAULT_SAMPLES,
     tool: ArrayLike | None = None,
+    law: TimeLaw | None = None,
 ) -> Trajectory:
     """Return the trajectory along a path of straight moves.
 
@@ -76,6 +79,7 @@ def trajectory(
         samples: Number of samples, both ends included.
         tool: Point that moves straight in the platform frame, shape (3,), in design units; None
             for b4.
+        law: Time law of the path, in place of a speed; None for the speed from start to end.
 
     Raises:
         InputError: There are too few poses, too few or too many samples, the speed is not
@@ -90,13 +94,18 @@ def trajectory(
         raise InputError(f"the speed must be above zero; got {actuator_speed:g}")
     moves = StraightMoves.along(poses, tool)
     count = len(poses) - 1
-    number, share = np.arange(count)[:, None], np.linspace(0.0, 1.0, STEPS + 1, dtype=np.float64)
-    joints = inverse(design, *moves.poses(*np.broadcast_arrays(number, share)))
-    travels = np.abs(np.diff(joints, axis=1)).max(axis=-1).ravel()
-    times = np.concatenate([[0.0], np.cumsum(travels)]) / actuator_speed
-    sampled = np.linspace(0.0, float(times[-1]), samples, dtype=np.float64)
-    # A path without motion takes no time: all its samples are at its start.
-    at = np.interp(sampled, times, np.arange(len(times)) / STEPS)
+    if law is None:
+        steps = np.linspace(0.0, 1.0, STEPS + 1, dtype=np.float64)
+        number, share = np.broadcast_arrays(np.arange(count)[:, None], steps)
+        joints = inverse(design, *moves.poses(number, share))
+        travels = np.abs(np.diff(joints, axis=1)).max(axis=-1).ravel()
+        times = np.concatenate([[0.0], np.cumsum(travels)]) / actuator_speed
+        sampled = np.linspace(0.0, float(times[-1]), samples, dtype=np.float64)
+        # A path without motion takes no time: all its samples are at its start.
+        at = np.interp(sampled, times, np.arange(len(times)) / STEPS)
+    else:
+        sampled = np.linspace(0.0, law.duration, samples, dtype=np.float64)
+        at = law.places(sampled)[0]
     at[-1] = count
     number = np.minimum(at.astype(np.int64), count - 1)
     position, rotation = moves.poses(number, at - number)

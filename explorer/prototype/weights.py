@@ -7,7 +7,7 @@ tight for its parts. Units are those of the lengths and the density given.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Payload
-from explorer.mechanism.pose import Quadruple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
-from explorer.statics.weights import Weights
+from explorer.statics.weights import MovingBodies
 
 
 @dataclass(frozen=True)
@@ -76,6 +74,9 @@ def mesh_mass(vertices: FloatArray, faces: NDArray[np.int32], density: float) ->
     return Mass(float(found["mass"]), found["center_mass"], found["inertia"])
 
 
+DENSITY = 1240.0
+"""The default density of the bodies, in kg/m³: that of printed PLA."""
+
 DEFAULT_RADIUS = 0.01
 """Radius, over the reach, of a leg that has none in the design."""
 
@@ -90,29 +91,38 @@ def leg_radii(design: Design) -> tuple[float, ...]:
     return tuple(radius or DEFAULT_RADIUS * design.reach for radius in design.limits.leg_radii)
 
 
-def machine_weights(design: Design, masses: Mapping[str, Mass], *, payload: bool = True) -> Weights:
-    """Return the weights of bodies and, unless it is left out, of the design's payload.
+def with_payload(design: Design, masses: Mapping[str, Mass]) -> Mapping[str, Mass]:
+    """Return the masses of the bodies, the design's payload being part of the platform."""
+    centre = 1e-3 * design.unit_mm * np.array(design.payload.centre)
+    payload = Mass(design.payload.mass_kg, centre, 1e-6 * np.diag(design.payload.inertia_kg_mm2))
+    return {**masses, "platform": total_mass([masses["platform"], payload])}
+
+
+def moving_bodies(
+    design: Design, masses: Mapping[str, Mass], *, payload: bool = True
+) -> MovingBodies:
+    """Return the masses of bodies and, unless it is left out, of the design's payload.
 
     The masses of the bodies are in their own frames, in metres and kilograms, such as
-    `explorer.prototype.assembly.Prototype.masses`.
+    `explorer.prototype.assembly.Prototype.masses`. Cylinders and rods have their centres on their
+    axes, and principal axes along those of their frames; the centre of a cross is at its joint.
     """
-    units = 1e3 / design.unit_mm
-    x, y, z = (units * masses["platform"].centre).tolist()
-    carried = (design.payload,) if payload else ()
-
-    def of_legs(kind: str, value: Callable[[Mass], float]) -> Quadruple:
-        a, b, c, d = (value(masses[f"{kind} {leg}"]) for leg in LEGS)
-        return a, b, c, d
-
-    two, three = (masses[f"carriage {leg}"].mass for leg in ON_GUIDE)
-    return Weights(
-        on_platform=(*carried, Payload(masses["platform"].mass, (x, y, z))),
-        carriages=(0.0, two, three, 0.0),
-        cylinders=of_legs("cylinder", lambda each: each.mass),
-        cylinder_centres=of_legs("cylinder", lambda each: units * float(each.centre[2])),
-        rods=of_legs("rod", lambda each: each.mass),
-        rod_centres=of_legs("rod", lambda each: -units * float(each.centre[2])),
+    metres = 1e-3 * design.unit_mm
+    rows: list[list[float]] = []
+    for leg, axis in zip(LEGS, Chains.of(design).mounts[:, :, 0], strict=True):
+        cylinder, rod = masses[f"cylinder {leg}"], masses[f"rod {leg}"]
+        first = masses[f"{'carriage' if leg in ON_GUIDE else 'cross'} {leg}"]
+        slides, turns = (first.mass, 0.0) if leg in ON_GUIDE else (0.0, first.inertia[0, 0])
+        height, back = cylinder.centre[2] / metres, -rod.centre[2] / metres
+        about = np.diag(cylinder.inertia + rod.inertia) / metres**2
+        about = about + cylinder.mass * height**2 * np.array([1.0, 1.0, 0.0])
+        of_leg = slides + cylinder.mass + rod.mass, rod.mass, back, cylinder.mass * height
+        rows.append([*of_leg, *about, turns / metres**2, *axis])
+    own = masses["platform"]
+    bodies = MovingBodies(legs=rows).with_mass(
+        own.mass, own.centre / metres, own.inertia / metres**2
     )
+    return bodies.with_payload(design) if payload else bodies
 
 
 def bar_masses(design: Design, density: float) -> Mapping[str, Mass]:

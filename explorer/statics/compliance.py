@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, STRUT_ROWS, Design
+from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray, finite_array, lengths_of, positive_array
 from explorer.numerics.compiled import helper, kernel
 from explorer.statics.forces import B2, B3, load_array, twists_of_actuators
@@ -136,8 +137,7 @@ def stiffness_of(design: Design) -> tuple[FloatArray, FloatArray]:
 
     Shapes are (6,) in N/unit and (2,) in N × unit²; infinite where the design states none.
     """
-    given = design.actuators.stiffness_n_mm
-    stiffness = np.full(6, np.inf) if given is None else np.array(given) * design.unit_mm
+    stiffness = design.unit_mm * or_infinite(design.actuators.stiffness_n_mm)
     return stiffness, np.full(2, design.struts.bending_stiffness / design.unit_mm**2)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ from explorer.statics.reactions import (
     limit_shares,
     reactions,
 )
-from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry
+from explorer.statics.weights import Carried, MovingBodies, carry
 
 NO_LOAD: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -60,7 +60,7 @@ class LoadedPose:
     design: Design
     pose: Pose
     load: Six = NO_LOAD
-    own: Weights | None = None
+    own: MovingBodies | None = None
     weighs_payload: bool = True
     point: Triple | None = None
 
@@ -75,11 +75,10 @@ class LoadedPose:
         return Configuration.at(self.design, self.pose, self.tool)
 
     @cached_property
-    def weights(self) -> Weights:
+    def weights(self) -> MovingBodies:
         """All masses."""
-        own = self.own or NO_WEIGHTS
-        payload: tuple[Payload, ...] = (self.design.payload,) if self.weighs_payload else ()
-        return replace(own, on_platform=(*own.on_platform, *payload))
+        own = self.own or MovingBodies()
+        return own.with_payload(self.design) if self.weighs_payload else own
 
     @cached_property
     def carried(self) -> Carried:

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
-from explorer.mechanism.machine import Payload
+from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
 from explorer.statics.forces import forces_of, twists_of_actuators
-from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry
+from explorer.statics.weights import Carried, MovingBodies, carry
 
 LIMITED = (
     *JOINTS,
@@ -58,7 +58,7 @@ class Reactions(NamedTuple):
 
 
 def reactions(
-    configuration: Configuration, load: ArrayLike, weights: Weights | Carried | None = None
+    configuration: Configuration, load: ArrayLike, weights: MovingBodies | Carried | None = None
 ) -> Reactions:
     """Return all that holds a load and weights.
 
@@ -77,7 +77,7 @@ def reactions(
         InputError: The load is not finite, or batch axes do not broadcast.
     """
     known = isinstance(weights, Carried)
-    carried = weights if known else carry(configuration, weights or NO_WEIGHTS)
+    carried = weights if known else carry(configuration, weights or MovingBodies())
     forces = forces_of(configuration, carried.wrench + np.asarray(load, dtype=np.float64))
     signed = _signed(configuration, forces, carried)
     across = signed[..., 8:].reshape(*signed.shape[:-1], 2, 2)
@@ -133,7 +133,7 @@ def has_limits(design: Design) -> bool:
 def largest_payload(
     configuration: Configuration,
     load: ArrayLike = (0.0,) * 6,
-    weights: Weights | None = None,
+    weights: MovingBodies | None = None,
 ) -> FloatArray:
     """Return the largest mass at the payload's centre that keeps all limits, shape (...), in kg.
 
@@ -151,9 +151,8 @@ def largest_payload(
         InputError: The load is not finite, or batch axes do not broadcast.
     """
     design = configuration.design
-    base = carry(configuration, weights or NO_WEIGHTS)
-    one = Weights(on_platform=(Payload(1.0, design.payload.centre),))
-    kilogram = carry(configuration, one)
+    base = carry(configuration, weights or MovingBodies())
+    kilogram = carry(configuration, MovingBodies().with_mass(1.0, design.payload.centre))
     at_zero = forces_of(configuration, base.wrench + np.asarray(load, dtype=np.float64))
     by_one = forces_of(configuration, kilogram.wrench)
     regular = np.isfinite(at_zero[..., 0])
@@ -172,6 +171,29 @@ def largest_payload(
     ):
         smallest, largest = np.maximum(smallest, least), np.minimum(largest, most)
     return np.where(regular & (smallest <= largest), largest, 0.0)
+
+
+def largest_accelerations(configuration: Configuration) -> FloatArray:
+    """Return the largest accelerations from rest by the limit of each part, (..., 10), in m/s².
+
+    The platform accelerates in every direction, without turning, so that all its points do so
+    alike. It carries the design's payload, whose weight and force of any direction act besides;
+    the legs count as weightless. To hold the payload a part needs a force −t · m (g − a), with t
+    the velocity of the payload's centre for a unit rate of an actuator, so that the directions of
+    ±t are the worst. The order is that of `part_limits`. Values are below zero where the payload
+    is not held at rest, −∞ in a singular pose, and infinite for a part without a limit.
+    """
+    design = configuration.design
+    held = reactions(configuration, np.zeros(6), MovingBodies().with_payload(design))
+    values = np.concatenate([held.actuators, held.bending, held.guide_force], axis=-1)
+    regular = np.isfinite(values)
+    values = np.where(regular, values, 0.0)
+    highs, lows = part_limits(design)
+    spare = np.minimum(highs - values, lows + values) - held.spread[..., :10]
+    effect = _effect(configuration, regular.shape[:-1], design.payload.centre)
+    by_one = design.payload.mass_kg * effect[..., :10]
+    unloaded = np.where(regular & (spare >= 0.0), np.inf, -np.inf)
+    return np.divide(spare, by_one, out=unloaded, where=by_one > 0.0)
 
 
 def _limits(design: Design) -> FloatArray:
@@ -198,7 +220,7 @@ def _signed(c: Configuration, forces: FloatArray, carried: Carried) -> FloatArra
     for leg, row in zip((1, 2), STRUT_ROWS, strict=True):
         radial = forces[..., row, None]
         # The weight of the leg acts on the guide, less what the platform carries of it.
-        own = carried.legs[leg, 1:] - carried.at_joints[..., leg, 1:]
+        own = carried.legs[..., leg, 1:] - carried.at_joints[..., leg, 1:]
         ok, axis = np.isfinite(radial), c.leg_directions[..., leg, 1:]
         across.append(np.where(ok, own - np.where(ok, radial, 0.0) * axis, np.inf))
     return _join(forces.shape[:-1], forces, moments, *across)
@@ -208,12 +230,16 @@ def _spread(c: Configuration, batch: tuple[int, ...]) -> FloatArray:
     """Return the effect of the payload's force of any direction, see `Reactions`."""
     if not c.design.payload.force_n:
         return np.zeros((*batch, 12))
-    # By the principle of virtual work, a force F at the tool asks F · v of an actuator whose
-    # unit rate moves the tool by v.
-    tool = c.design.tool.position
-    velocities = twists_of_actuators(c.with_tool(tool))[..., :3, :]
+    return c.design.payload.force_n * _effect(c, batch, c.design.tool.position)
+
+
+def _effect(c: Configuration, batch: tuple[int, ...], point: Triple) -> FloatArray:
+    """Return the effect of a force of 1 N of any direction at a point of the platform."""
+    # By the principle of virtual work, a force F at the point asks F · v of an actuator whose
+    # unit rate moves the point by v.
+    velocities = twists_of_actuators(c.with_tool(point))[..., :3, :]
     speeds = np.sqrt((velocities * velocities).sum(axis=-2))
-    forces = c.design.payload.force_n * np.where(np.isfinite(speeds), speeds, 0.0)
+    forces = np.where(np.isfinite(speeds), speeds, 0.0)
     bending = forces[..., GUIDE_ROWS] * c.joints[..., STRUT_ROWS]
     return _join(batch, forces, bending, forces[..., STRUT_ROWS], bending)
 

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, STRUT_ROWS, VARIABLES, Design
-from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.mechanism.machine import Payload, Tool
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.statics.accuracy import actuator_errors, largest_error
 from explorer.statics.compliance import largest_deflection, softness_with_struts, stiffness_of
 from explorer.statics.forces import twists_of_actuators
+from explorer.statics.reactions import part_limits
 from explorer.statics.weights import payload_wrench
 
 PARAMETERS = (*VARIABLES, "yaw", "x", "y", "z")
@@ -92,11 +95,13 @@ def share_slopes(
     slopes: TwistSlopes,
     parts: tuple[IntArray, IntArray],
     limits: FloatArray,
+    is_up: BoolArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return shares of limits, shape (k,), and their derivatives by `PARAMETERS`, shape (k, 10).
 
     The parts are the index of the position and that of the part for each share, shape (k,) each;
-    the limits (2, 10) are those of `explorer.statics.reactions.part_limits`.
+    the limits (2, 10) are those of `explorer.statics.reactions.part_limits`. Whether the limit of
+    the largest value is meant, shape (k,), follows from the larger share if it is None.
     """
     row, part = parts
     joint = ACTUATOR_OF[part]
@@ -109,9 +114,9 @@ def share_slopes(
     spread = design.payload.force_n * speed
     spread_by = design.payload.force_n * np.einsum("ki,kqi->kq", along, by[..., :3])
     highs, lows = limits[0, part], limits[1, part]
-    is_up = (force + spread) / highs >= (spread - force) / lows
-    sign = np.where(is_up, 1.0, -1.0)
-    limit = np.asarray(np.where(is_up, highs, lows), dtype=np.float64)
+    up = (force + spread) / highs >= (spread - force) / lows if is_up is None else is_up
+    sign = np.where(up, 1.0, -1.0)
+    limit = np.asarray(np.where(up, highs, lows), dtype=np.float64)
     value = sign * force + spread
     value_by = sign[:, None] * force_by + spread_by
     bends = (part >= BENDING.start) & (part < BENDING.stop)
@@ -120,6 +125,30 @@ def share_slopes(
     lever_by = np.where(bends[:, None], slopes.struts_by[row, :, strut], 0.0)
     value_by = value_by * lever[:, None] + value[:, None] * lever_by
     return value * lever / limit, np.asarray(value_by / limit[:, None])
+
+
+def acceleration_slopes(
+    design: Design, positions: FloatArray, rotation: FloatArray, parts: tuple[IntArray, IntArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return largest accelerations, shape (k,), in m/s², and derivatives by `PARAMETERS`, (k, 10).
+
+    They are those of `explorer.statics.reactions.largest_accelerations` at regular positions
+    (n, 3); the parts are those of `share_slopes`. Derivatives of an infinite one are zero.
+    """
+    own, limits = design.payload, part_limits(design)
+    # An acceleration of 1 m/s² does what a force of any direction at the payload's centre does.
+    unit = msgspec.structs.replace(design, tool=Tool(own.centre), payload=Payload(force_n=1.0))
+    held, moved = (twist_slopes(each, positions, rotation) for each in (design, unit))
+    row, part = parts
+    force = -held.twists[row, :, ACTUATOR_OF[part]] @ payload_wrench(design, rotation)
+    is_up = limits[0, part] - force <= limits[1, part] + force
+    share, share_by = share_slopes(design, rotation, held, parts, limits, is_up)
+    by_one, slope = share_slopes(unit, rotation, moved, parts, limits, is_up)
+    loads, by_one, slope = by_one > 0.0, own.mass_kg * by_one, own.mass_kg * slope
+    out = np.where(share <= 1.0, np.inf, -np.inf), np.zeros(slope.shape)
+    value = np.divide(1.0 - share, by_one, out=out[0], where=loads)
+    change = -share_by - np.where(loads, value, 0.0)[:, None] * slope
+    return value, np.divide(change, by_one[:, None], out=out[1], where=loads[:, None])
 
 
 def error_slopes(

@@ -1,80 +1,99 @@
-"""The weights of the payload, the platform and the legs, as a load that the actuators hold.
+"""Weights and inertia of payload, platform and legs, as a load that the actuators hold.
 
-By virtual work, the weight of a leg acts on the actuators like one force at its platform joint.
-For a leg of length l with the direction û, whose cylinder (mass m, centre at a distance s from
-its base joint) and rod (mass n, centre at a distance r back from its platform joint) have their
-centres on the axis, that force is n g + (m s − n r) / l · P g, where P projects across û. A leg on
-the guide turns about the guide only, so P projects across û and x̂, and the actuator d1 or d3 holds
-the part along the guide of all its weights, its carriage included.
+By d'Alembert's principle a body whose centre accelerates by a has the weight m (g − a) and the
+moment of its inertia. By virtual work the weight and inertia of a leg act on the actuators like one
+force at its end. A leg's motion follows from that of its end: its universal joint turns about one
+axis that the base holds and one across that and the leg, so that a leg that swings also spins. The
+actuators d1 and d3 hold the part along the guide of legs 2 and 3, their carriages included.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import STANDARD_GRAVITY, Payload
-from explorer.mechanism.pose import Quadruple
-from explorer.numerics.arrays import FloatArray, dot, rotate
-from explorer.numerics.checks import numbers
+from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, along, column, cross3, dot3, norm3, times, vector
+from explorer.statics.forces import A3X, A3Y
 
-NOTHING: Quadruple = (0.0, 0.0, 0.0, 0.0)
 ON_GUIDE = np.array([False, True, True, False])
-X_AXIS = np.array([1.0, 0.0, 0.0])
+FASTEST = 1e20
+"""Largest entry of a twist or an acceleration, far below what makes forces overflow."""
+AT_REST = (0.0,) * 6
+
+# Columns of the rows of the legs, see `MovingBodies`.
+TOTAL, ROD, ROD_CENTRE, MOMENT, SIDE_X, SIDE_Y, SPIN, CROSS, AXIS_X, AXIS_Y, AXIS_Z = range(11)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Weights:
-    """Masses of the moving bodies, in kilograms, with distances in design units, by leg.
+@dataclass(frozen=True)
+class MovingBodies:
+    """The masses that move, in kilograms, with lengths in design units; none by default.
 
     Attributes:
-        on_platform: Masses that move with the platform, such as the platform and its payload.
-        carriages: Masses of the carriages of legs 2 and 3; those of legs 1 and 4 do not move.
-        cylinders, rods: Masses of the cylinders and of the rods.
-        cylinder_centres: Distances of their centres from the base joints, along the legs.
-        rod_centres: Distances of their centres from the platform joints, back along the legs.
-
-    Raises:
-        DesignError: A field of the legs is not four finite numbers.
+        platform: Of the platform with all that it carries, in its frame, 4 × 4 numbers: its inertia
+            about b4 in the first three rows and columns, mass × centre in the last column and row,
+            and its mass where they meet.
+        legs: Eleven numbers of each leg: its mass, the carriage's included; mass of its rod and
+            distance of the rod's centre back from the platform joint; mass of its cylinder times
+            the distance of its centre from the base joint; inertia of cylinder and rod about the
+            two axes across the leg, of the cylinder about the base joint, of the rod about its
+            centre; inertia of both about the leg; inertia of the cross about the axis that the base
+            holds; and this axis in the base frame.
     """
 
-    on_platform: tuple[Payload, ...] = ()
-    carriages: Quadruple = NOTHING
-    cylinders: Quadruple = NOTHING
-    cylinder_centres: Quadruple = NOTHING
-    rods: Quadruple = NOTHING
-    rod_centres: Quadruple = NOTHING
+    platform: ArrayLike = ((0.0,) * 4,) * 4
+    legs: ArrayLike = ((0.0,) * 11,) * 4
 
     def __post_init__(self) -> None:
-        # Plain numbers, whatever was given, so that weights can be compared.
-        object.__setattr__(self, "on_platform", tuple(self.on_platform))
-        for name in ("carriages", "cylinders", "cylinder_centres", "rods", "rod_centres"):
-            object.__setattr__(self, name, tuple(numbers(name, getattr(self, name), 4)))
+        # Plain numbers, so that bodies can be compared.
+        for name in ("platform", "legs"):
+            rows: list[list[float]] = np.asarray(getattr(self, name), dtype=np.float64).tolist()
+            object.__setattr__(self, name, tuple(map(tuple, rows)))
 
-    @property
-    def has_legs(self) -> bool:
-        """Whether a carriage, a cylinder or a rod has a mass."""
-        return any((*self.carriages, *self.cylinders, *self.rods))
+    def with_mass(
+        self, mass: float, centre: ArrayLike, inertia: ArrayLike = ((0.0,) * 3,) * 3
+    ) -> MovingBodies:
+        """Return these bodies with another mass on the platform, with its inertia about its centre.
 
+        The centre (3,) and the inertia (3, 3) are in the frame of the platform.
+        """
+        off, matrix = np.array(centre), np.array(self.platform)
+        matrix[:3, :3] += np.array(inertia) + mass * (off @ off * np.eye(3) - np.outer(off, off))
+        matrix[:3, 3] += mass * off
+        matrix[3, :3] += mass * off
+        matrix[3, 3] += mass
+        return replace(self, platform=matrix)
 
-NO_WEIGHTS = Weights()
-"""The weights of bodies without masses."""
+    def with_payload(self, design: Design) -> MovingBodies:
+        """Return these bodies with the payload of a design."""
+        payload = design.payload
+        inertia = np.diag(payload.inertia_kg_mm2) / design.unit_mm**2
+        return self.with_mass(payload.mass_kg, payload.centre, inertia)
+
+    @cached_property
+    def arrays(self) -> tuple[FloatArray, FloatArray]:
+        """The platform's matrix (4, 4) and the legs' rows (4, 11)."""
+        return np.array(self.platform), np.array(self.legs)
 
 
 @dataclass(frozen=True)
 class Carried:
-    """What weights do in some poses.
+    """What weights and inertia do in some poses or motions.
 
     Attributes:
-        wrench: (F; M) on the platform at the tool point, base axes, that stands for all weights,
+        wrench: (F; M) on the platform at the tool point, base axes, that stands for all of them,
             shape (..., 6), in N and N × unit.
         at_joints: Parts of it that stand for the legs, at b1 to b4, shape (..., 4, 3), in N.
-        along_guide: Moments by which the weights of legs 2 and 3 change those of the forces of d1
-            and d3 at the carriages, shape (..., 2), in N × unit.
-        legs: Weights of the legs, carriages included, shape (4, 3), in N.
+        along_guide: Moments by which legs 2 and 3 change those of the forces of d1 and d3 at the
+            carriages, shape (..., 2), in N × unit.
+        legs: Weights and inertia of the legs, carriages included, shape (..., 4, 3), in N.
     """
 
     wrench: FloatArray
@@ -83,69 +102,181 @@ class Carried:
     legs: FloatArray = field(repr=False)
 
 
-def design_weights(design: Design) -> Weights:
-    """Return the weights that a design states: its payload."""
-    return Weights(on_platform=(design.payload,))
-
-
 def payload_wrench(design: Design, rotation: FloatArray) -> FloatArray:
     """Return the weight of the design's payload as a wrench (F; M) at its tool, shape (6,)."""
-    g, tool = STANDARD_GRAVITY * np.array(design.gravity), np.array(design.tool.position)
-    return np.concatenate(_of_bodies(rotation, rotation @ tool, design_weights(design), g))
+    payload = design.payload
+    weight = payload.mass_kg * STANDARD_GRAVITY * np.array(design.gravity)
+    arm = rotation @ np.subtract(payload.centre, design.tool.position)
+    return np.concatenate([weight, np.cross(arm, weight)])
 
 
-def carry(configuration: Configuration, weights: Weights) -> Carried:
-    """Return what weights do in poses, in the design's direction of gravity."""
-    c = configuration
-    points, shift = c.points, c.arm
-    g = STANDARD_GRAVITY * np.array(c.design.gravity)
-    force, moment = _of_bodies(c.rotation, shift, weights, g)
-    if not weights.has_legs:
-        wrench = np.broadcast_to(np.concatenate([force, moment], axis=-1), (*c.batch, 6))
-        return Carried(
-            wrench, np.zeros((*c.batch, 4, 3)), np.zeros((*c.batch, 2)), np.zeros((4, 3))
-        )
-    at_joints = _legs_at_joints(c, weights, g)
-    ends = np.stack([points.b1, points.b2, points.b3, points.b4], axis=-2)
-    arms = ends - points.b4[..., None, :] - shift[..., None, :]
-    moment = moment + np.cross(arms, at_joints).sum(axis=-2)
-    force = force + at_joints.sum(axis=-2)
-    wrench = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
-    legs = np.outer(np.add(weights.cylinders, weights.rods), g)
-    legs += np.outer(np.where(ON_GUIDE, weights.carriages, 0.0), g)
-    return Carried(wrench, at_joints, _moments_along_guide(c, weights, g), legs)
+def motion_array(name: str, value: ArrayLike) -> FloatArray:
+    """Return a twist or an acceleration (..., 6) as float64 after checking it."""
+    return finite_array(f"the {name} (X Y Z, then turning)", value, (6,), FASTEST)
 
 
-def _of_bodies(
-    r: FloatArray, shift: FloatArray, weights: Weights, g: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return force and moment at the tool point of the weights on the platform, both (..., 3)."""
-    force, moment = np.zeros(3), np.zeros(3)
-    for body in weights.on_platform:
-        weight = body.mass_kg * g
-        arm = rotate(r, np.array(body.centre)) - shift
-        force = force + weight
-        moment = moment + np.cross(arm, weight)
-    return np.broadcast_to(force, moment.shape), moment
+@helper
+def combine(shares: Vector, x: Vector, y: Vector, z: Vector) -> Vector:
+    """Return the sum of three vectors with shares."""
+    return along(along(along((0.0, 0.0, 0.0), shares[0], x), shares[1], y), shares[2], z)
 
 
-def _legs_at_joints(c: Configuration, weights: Weights, g: FloatArray) -> FloatArray:
-    axes, lengths = c.leg_directions, c.leg_lengths
-    cylinders, rods = np.array(weights.cylinders), np.array(weights.rods)
-    moments = cylinders * np.array(weights.cylinder_centres) - rods * np.array(weights.rod_centres)
-    along = dot(axes, np.broadcast_to(g, axes.shape))[..., None] * axes
-    across = g - along - np.where(ON_GUIDE[:, None], g[0] * X_AXIS, 0.0)
-    ratio = np.divide(moments, lengths, out=np.zeros(lengths.shape), where=lengths > 0.0)
-    carried = np.where(ON_GUIDE, cylinders + np.array(weights.carriages), 0.0)
-    return np.asarray(
-        rods[:, None] * g + ratio[..., None] * across + np.outer(carried, g[0] * X_AXIS)
+@helper
+def acceleration_of(a: Vector, turning: Vector, turning_rate: Vector, arm: Vector) -> Vector:
+    """Return the acceleration of a point of a body at an arm from one with the acceleration a."""
+    swing = cross3(turning, arm)
+    return along(along(a, 1.0, cross3(turning_rate, arm)), 1.0, cross3(turning, swing))
+
+
+@helper
+def leg_inertia(
+    leg: Vector, v: Vector, a: Vector, g: Vector, on_guide: bool, m: FloatArray
+) -> tuple[Vector, Vector, float]:
+    """Return what a leg's weight and inertia do, given its vector and the motion of its end.
+
+    Returns:
+        The force at its end that stands for them, their sum, and the moment by which they change
+        that of the force of its carriage, in N and N × unit.
+    """
+    slide, first = 0.0, (m[AXIS_X], m[AXIS_Y], m[AXIS_Z])
+    if on_guide:
+        slide = a[0]
+        leg, v, a = (0.0, leg[1], leg[2]), (0.0, v[1], v[2]), (0.0, a[1], a[2])
+    length = norm3(leg)
+    if length == 0.0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+    n, total = m[ROD], m[TOTAL]
+    s = along((0.0, 0.0, 0.0), 1.0 / length, leg)
+    # The leg's frame (x, y, s): y is the second axis of the universal joint. Along the first axis
+    # that is undefined, and the spin is taken as zero.
+    y, cosine = cross3(s, first), dot3(s, first)
+    sine = norm3(y)
+    if sine > 0.0:
+        y = along((0.0, 0.0, 0.0), 1.0 / sine, y)
+    else:
+        y, cosine, sine = (0.0, 0.0, 1.0), 0.0, 1.0
+    x, tangent = cross3(y, s), cosine / sine
+    # Angular velocity and acceleration, in this frame.
+    rate = dot3(s, v)
+    wx, wy = -dot3(y, v) / length, dot3(x, v) / length
+    wz = tangent * wx
+    square = wx * wx + wy * wy
+    ax = -(dot3(y, a) + 2.0 * rate * wx) / length + wy * wz
+    ay = (dot3(x, a) - 2.0 * rate * wy) / length - wx * wz
+    cross_rate = (ax + wy * wz) / sine
+    az = cosine * cross_rate + wx * wy
+    # Euler's equations of cylinder and rod about the base joint.
+    back = length - m[ROD_CENTRE]
+    moment = m[MOMENT] + n * back
+    ix, iy, iz = m[SIDE_X] + n * back * back, m[SIDE_Y] + n * back * back, m[SPIN]
+    # The rod goes farther out, so that the inertia about the base joint grows at this rate.
+    growth = 2.0 * n * back * rate
+    tx = ix * ax + growth * wx + (iz - iy) * wy * wz + moment * dot3(y, g)
+    ty = iy * ay + growth * wy + (ix - iz) * wx * wz - moment * dot3(x, g)
+    tz = iz * az + (iy - ix) * wx * wy
+    about_first = tx + tangent * tz + m[CROSS] * cross_rate / sine
+    rate_change = dot3(s, a) + length * square
+    along_leg = n * (rate_change - back * square - dot3(s, g))
+    across = total * (slide - g[0]) if on_guide else ty / length
+    at_end = combine((-across, about_first / length, -along_leg), x, y, s)
+    # The sum of mass × acceleration is n a + swinging · l s̈, with l s̈ = a − l̈ s − 2 l̇ ṡ.
+    swinging = (m[MOMENT] - n * m[ROD_CENTRE]) / length
+    swing = along(a, -1.0, combine((2.0 * rate * wy, -2.0 * rate * wx, rate_change), x, y, s))
+    total_force = combine((total, -n, -swinging), g, a, swing)
+    total_force = (total_force[0] - total * slide, total_force[1], total_force[2])
+    return at_end, total_force, (g[0] - slide) * (total * length - moment)
+
+
+@kernel(
+    "void(f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], "
+    "f8[:,::1], f8[:,::1])"
+)
+def inertia_rows(
+    variables: FloatArray,
+    points: FloatArray,
+    gravity: FloatArray,
+    platform: FloatArray,
+    legs: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    twists: FloatArray,
+    accelerations: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write what weight and inertia do in n motions, shape (n, 32).
+
+    It is that of `Carried`: the wrench, but at b4, at the joints, along the guide, and of the legs.
+    """
+    g = (gravity[0], gravity[1], gravity[2])
+    mass = platform[3, 3]
+    for k in range(position.shape[0]):
+        r, p = rotation[k], vector(position, k)
+        t, rate = twists[k % twists.shape[0]], accelerations[k % accelerations.shape[0]]
+        v, turning = (t[0], t[1], t[2]), (t[3], t[4], t[5])
+        a, turning_rate = (rate[0], rate[1], rate[2]), (rate[3], rate[4], rate[5])
+        x, y, z = column(r, 0), column(r, 1), column(r, 2)
+        # The platform turns in its own frame, in which its inertia does not change.
+        own = (dot3(x, turning), dot3(y, turning), dot3(z, turning))
+        own_rate = (dot3(x, turning_rate), dot3(y, turning_rate), dot3(z, turning_rate))
+        i, j, h = column(platform, 0), column(platform, 1), column(platform, 2)
+        torque = along(combine(own_rate, i, j, h), 1.0, cross3(own, combine(own, i, j, h)))
+        # Mass × centre from b4, and mass × the acceleration of the centre beyond that of b4.
+        first_moment = combine(column(platform, 3), x, y, z)
+        inwards = acceleration_of((0.0, 0.0, 0.0), turning, turning_rate, first_moment)
+        from_b4 = along(g, -1.0, a)
+        force = along((-inwards[0], -inwards[1], -inwards[2]), mass, from_b4)
+        moment = along(cross3(first_moment, from_b4), -1.0, combine(torque, x, y, z))
+        for leg in range(4):
+            arm, on_guide = times(r, points[leg]), 0 < leg < 3
+            end = along(p, 1.0, arm)
+            if leg == 3:
+                end = (end[0] - variables[A3X], end[1] - variables[A3Y], end[2])
+            end_v = along(v, 1.0, cross3(turning, arm))
+            end_a = acceleration_of(a, turning, turning_rate, arm)
+            at_end, total, on_carriage = leg_inertia(end, end_v, end_a, g, on_guide, legs[leg])
+            force, moment = along(force, 1.0, at_end), along(moment, 1.0, cross3(arm, at_end))
+            if on_guide:
+                out[k, 17 + leg] = on_carriage
+            for axis in range(3):
+                out[k, 6 + 3 * leg + axis], out[k, 20 + 3 * leg + axis] = at_end[axis], total[axis]
+        for axis in range(3):
+            out[k, axis], out[k, 3 + axis] = force[axis], moment[axis]
+
+
+def carry(
+    configuration: Configuration,
+    bodies: MovingBodies,
+    twist: ArrayLike = AT_REST,
+    acceleration: ArrayLike = AT_REST,
+) -> Carried:
+    """Return what weight and inertia of bodies do at rest or in a motion.
+
+    The twist and the acceleration are those of `explorer.statics.motion.joint_accelerations`, of b4
+    whatever the tool of the configuration. Where a leg lies along the first axis of its universal
+    joint, its spin is undefined and taken as zero.
+
+    Raises:
+        InputError: A number is not finite, or batch axes do not broadcast.
+    """
+    t, rate = motion_array("twist", twist), motion_array("acceleration", acceleration)
+    c, metres = configuration.spread(t, rate), 1e-3 * configuration.design.unit_mm
+    out = np.empty((len(c.positions), 32))
+    inertia_rows(
+        len(out),
+        c.variables,
+        c.design.platform_points,
+        STANDARD_GRAVITY / metres * np.array(c.design.gravity),
+        *bodies.arrays,
+        c.positions,
+        c.rotations,
+        c.rows_or_one(t),
+        c.rows_or_one(rate),
+        out,
     )
-
-
-def _moments_along_guide(c: Configuration, weights: Weights, g: FloatArray) -> FloatArray:
-    """Return g_x (m_carriage d + m_rod r + m_cylinder (d − s)) of legs 2 and 3."""
-    lengths = c.leg_lengths[..., 1:3]
-    carriages, cylinders = np.array(weights.carriages)[1:3], np.array(weights.cylinders)[1:3]
-    of_rods = np.array(weights.rods)[1:3] * np.array(weights.rod_centres)[1:3]
-    of_cylinders = cylinders * (lengths - np.array(weights.cylinder_centres)[1:3])
-    return g[0] * (carriages * lengths + of_rods + of_cylinders)
+    # Masses times units/s² so far.
+    out = metres * out.reshape(*c.batch, 32)
+    wrench, along_guide = out[..., :6], out[..., 18:20]
+    if c.tool.any():
+        wrench[..., 3:] -= np.cross(c.arm, wrench[..., :3])
+    at_joints, of_legs = (out[..., i : i + 12].reshape(*c.batch, 4, 3) for i in (6, 20))
+    return Carried(wrench, at_joints, along_guide, of_legs)

@@ -196,6 +196,8 @@ MAKERS: tuple[Make, ...] = (
             "kind": "straight" if i > 2 else "planned",
             "seconds": 1e-3 + share,
             "holds_load": share > 0.5,
+            "drives": ("off", "shortest", "duration")[i % 3],
+            "duration": 1e-3 + share,
         },
     ),
     _request,
@@ -264,10 +266,11 @@ def rich_state() -> State:
         "volume": 1e4 / 3,
         "free": (VARIABLES[4], YAW, PLACE),
         "box": ((0.0, 0.0, 0.0), (4 / 3, 2.0, 1 / 3)),
-        # The design has no load, no errors and no stiffness to search with.
+        # The design has no load, no mass, no errors and no stiffness to search with.
         "held": False,
         "error": 0.0,
         "deflection": 0.0,
+        "acceleration": 0.0,
         "tilt": 0.0,
     }
     actions: list[Action | Callable[[State], Action]] = [
@@ -283,6 +286,7 @@ def rich_state() -> State:
         Go(),
         SetPathTime(10 / 3),
         Change("paths", {"start": home, "goal": beyond, "kind": "planned", "holds_load": True}),
+        Change("paths", {"drives": "duration", "duration": 0.5}),
         Pin(OPTIMAL),
         Change("compared", {"look": varied(Look())}),
         Change("", {"studies": varied(Studies())}),
@@ -291,7 +295,13 @@ def rich_state() -> State:
         BrushAxes((Brush("volume", ((1 / 3, 10.0),)),)),
         Change(
             "optimisation.request",
-            {"held": True, "error": 1 / 3, "deflection": 2 / 3, "tilt": 10 / 3},
+            {
+                "held": True,
+                "error": 1 / 3,
+                "deflection": 2 / 3,
+                "acceleration": 4 / 3,
+                "tilt": 10 / 3,
+            },
         ),
         SetFold(4, 100 / 3),
         SetJoint(0, 99.1),

@@ -36,7 +36,7 @@ from explorer.app.state.compared import SLOTS
 from explorer.app.widgets import assigning
 from explorer.app.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 from explorer.app.widgets.buttons import Buttons, extra_button, press_button
-from explorer.files.extras import EXTRAS, install_command
+from explorer.files.extras import EXTRAS, LINUX_ALONE, install_command
 from explorer.files.packaged import SOURCES
 from explorer.mechanism.design_file import PRESETS
 
@@ -81,7 +81,7 @@ def test_button_of_a_missing_library_says_what_needs_it_and_copies_the_command(
         assert words in html
     # No button where there is nothing to install.
     monkeypatch.setattr("sys.platform", "win32")
-    assert ("<button" in extra_button(extra)) == (extra != "planning")
+    assert ("<button" in extra_button(extra)) == (extra not in LINUX_ALONE)
 
 
 def test_press_that_nothing_offers_does_nothing(running: Running, tab: SocketTab) -> None:

@@ -463,7 +463,7 @@ def test_undo_and_redo_are_those_of_the_session(running: Running, palette: Palet
 
 UNITS = re.compile(
     r"design units|units³|cm³|\bunits\b|\bmm\b|millimetres|pixels|\(px\)|°|degrees|\(s\)|seconds"
-    r"|kg/m³|\bstep\b|\bkg\b|\bN( m)?\b|\bGPa\b|\bMPa\b"
+    r"|kg/m³|m/s²|\bstep\b|\bkg\b|\bN( m)?\b|\bGPa\b|\bMPa\b"
 )
 
 WITHOUT_UNIT = {

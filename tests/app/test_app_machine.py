@@ -91,6 +91,7 @@ def design_with(**machine: Any) -> Design:
 PLAIN: list[tuple[str, object, Callable[[Design], object]]] = [
     ("tool z", 3.25, lambda design: design.tool.position[2]),
     ("Mass (kg)", 2.5, lambda design: design.payload.mass_kg),
+    ("Inertia (kg mm²)", (9.0, 8.0, 7.0), lambda design: design.payload.inertia_kg_mm2),
     ("centre y", -1.5, lambda design: design.payload.centre[1]),
     ("Force on the tool (N)", 20.0, lambda design: design.payload.force_n),
     ("Gravity", "along −y", lambda design: design.gravity[1] == -1.0),
@@ -99,7 +100,10 @@ PLAIN: list[tuple[str, object, Callable[[Design], object]]] = [
     ("Moment given directly", True, lambda design: design.struts.moment_nm),
     ("Limited guide force", True, lambda design: design.guide.force_n),
     ("Limited guide moment", True, lambda design: design.guide.moment_nm),
-    ("Error of each (mm)", 0.02, lambda design: design.actuators.error_mm[3]),
+    ("Error (mm)", 0.02, lambda design: design.actuators.error_mm[3]),
+    ("Limited continuous force", True, lambda design: design.actuators.continuous_n),
+    ("Limited speed", True, lambda design: design.actuators.speed_mm_s),
+    ("Limited acceleration", True, lambda design: design.actuators.acceleration_mm_s2),
     ("Elastic", True, lambda design: design.actuators.stiffness_n_mm),
     ("a3 (± mm)", (0.1, 0.2, 0.0), lambda design: design.tolerances.a3),
     ("guide tilt z (± °)", 0.05, lambda design: design.tolerances.guide_tilt_deg[1]),
@@ -125,9 +129,9 @@ def test_control_changes_the_design_in_one_step_that_is_undone_and_saved(
 
 def test_limits_are_switched_on_set_and_switched_off(hand: Hand) -> None:
     hand.set("Limited forces", True)
-    hand.set("Push of each (N)", 400.0)
+    hand.set("Push (N)", 400.0)
     assert hand.set("Pull of its own", True).actuators.pull_n == six(400.0)
-    design = hand.set("Pull of each (N)", 300.0)
+    design = hand.set("Pull (N)", 300.0)
     assert design.actuators == Actuators(six(400.0), six(300.0))
     assert hand.set("Pull of its own", False).actuators == Actuators(six(400.0))
     assert hand.set("Limited forces", False).actuators == Actuators()
@@ -155,10 +159,25 @@ def test_limits_are_switched_on_set_and_switched_off(hand: Hand) -> None:
     assert hand.set("Limited guide moment", False).guide == Guide()
 
 
+def test_limits_of_motion_start_with_typical_values_and_are_told(hand: Hand) -> None:
+    for label in ("Limited forces", "Limited continuous force", "Limited speed"):
+        hand.set(label, True)
+    design = hand.set("acceleration of l4 (mm/s²)", 500.0)
+    limits = Actuators(
+        push_n=six(100.0),
+        continuous_n=six(100.0),
+        speed_mm_s=six(200.0),
+        acceleration_mm_s2=(*six(2000.0)[:5], 500.0),
+    )
+    assert design.actuators == limits
+    words = machine_words(design, UNITS)
+    assert "continuous forces up to 100 N; speeds up to 200 mm/s; accelerations up to 500–" in words
+
+
 def test_field_of_a_limit_is_visible_only_while_the_limit_is_on(hand: Hand) -> None:
     fields = {
-        "Push of each (N)": "Limited forces",
-        "Pull of each (N)": "Pull of its own",
+        "Push (N)": "Limited forces",
+        "Pull (N)": "Pull of its own",
         "Outer diameter (mm)": "Tubes",
         "Largest stress (MPa)": "Limited stress",
         "Largest moment (N m)": "Moment given directly",
@@ -183,7 +202,7 @@ def test_field_of_all_actuators_shows_what_counts_of_single_ones_and_sets_all(ha
         ("push of d1 (N)", 250.0),
         ("push of l4 (N)", 80.0),
         ("Elastic", True),
-        ("Stiffness of each (N/mm)", 500.0),
+        ("Stiffness (N/mm)", 500.0),
         ("stiffness of l4 (N/mm)", 400.0),
         ("error of l1 (mm)", 0.03),
     ):
@@ -194,12 +213,12 @@ def test_field_of_all_actuators_shows_what_counts_of_single_ones_and_sets_all(ha
         stiffness_n_mm=(500.0, 500.0, 500.0, 500.0, 500.0, 400.0),
     )
     for label, value in (
-        ("Push of each (N)", 80.0),
-        ("Error of each (mm)", 0.03),
-        ("Stiffness of each (N/mm)", 400.0),
+        ("Push (N)", 80.0),
+        ("Error (mm)", 0.03),
+        ("Stiffness (N/mm)", 400.0),
     ):
         assert hand.controls[label].value == value
-    assert hand.set("Push of each (N)", 90.0).actuators.push_n == six(90.0)
+    assert hand.set("Push (N)", 90.0).actuators.push_n == six(90.0)
     assert hand.set("Elastic", False).actuators.stiffness_n_mm is None
 
 
@@ -217,8 +236,8 @@ def test_limit_of_the_pull_alone_is_shown_and_kept(services: Services, desk: Des
     desk.session.do(Open(design_with(actuators=Actuators(pull_n=six(90.0)))))
     hand = Hand(services, desk)
     assert hand.controls["Limited forces"].value
-    assert not hand.controls["Push of each (N)"].visible
-    assert hand.controls["Pull of each (N)"].value == 90.0
+    assert not hand.controls["Push (N)"].visible
+    assert hand.controls["Pull (N)"].value == 90.0
     assert "actuators pull up to 90 N" in machine_words(desk.state.design, UNITS)
     assert hand.set("Limited forces", False).actuators == Actuators()
 

@@ -29,6 +29,7 @@ from explorer.app.features.paths.actions import (
     ends_of,
     goal_of,
 )
+from explorer.app.features.paths.drives import drives_html
 from explorer.app.features.paths.feature import DIED, PathRunner, PathScene
 from explorer.app.features.paths.panel import (
     CANCEL,
@@ -49,6 +50,7 @@ from explorer.app.features.paths.plots import (
     incidence_columns,
     margins_in,
 )
+from explorer.app.features.paths.work import DrivesRequest, draw_drives, request_for
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Action, Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
@@ -200,6 +202,8 @@ def test_path_is_of_its_design() -> None:
     state = start_between(1, 5)
     other = SetVariable("b2", 2.7).apply(state)
     assert other.journey is None
+    heavier = Set("design.payload.mass_kg", 2.0).apply(state)
+    assert journey_of(heavier) == replace(journey_of(state), design=heavier.design)
     for action in (SetPathTime(1.0), Play(True)):
         with pytest.raises(InputError, match="no path for this design"):
             action.apply(other)
@@ -513,8 +517,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     PathRunner(services_for()).follow(Frame(state))
     _, task, arguments, *_ = orders[-1]
     poses = task(*arguments).poses
-    own = weights_of_parts((PRESS, 3000.0))
-    weights = replace(own, on_platform=(*own.on_platform, PRESS.payload))
+    weights = weights_of_parts((PRESS, 3000.0)).with_payload(PRESS)
     along = path_loads(PRESS, poses, state.load, tool=state.tool, weights=weights)
     assert 0.5 < along.share <= 1.0 + 1e-4
 
@@ -531,3 +534,36 @@ def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     pose = journey.pose_at(found.seconds)
     here = path_loads(PRESS, (pose, pose), state.load)
     assert (here.share, here.part) == (pytest.approx(expected.share), expected.part)
+
+
+# Speeds and forces along the path
+
+
+def drives_request(state: State) -> DrivesRequest:
+    request = request_for(state)
+    assert request is not None
+    return request
+
+
+def test_drives_of_the_path_are_requested_once_it_is_there_and_wanted() -> None:
+    state = with_ends(open_state(OPTIMAL), None, GOAL)
+    wanted = Set("paths.drives", "duration").apply(state)
+    assert request_for(wanted) is None
+    assert request_for(Go().apply(state)) is None
+    design, path = drives_request(Go().apply(wanted))
+    assert design == OPTIMAL
+    assert path.poses == journey_of(Go().apply(state)).poses
+    assert path.law == 1.0
+    assert drives_request(Set("paths.drives", "shortest").apply(Go().apply(wanted)))[1].law is None
+    with pytest.raises(InputError, match="a path needs a time above zero"):
+        Set("paths.duration", 0.0).apply(wanted)
+
+
+def test_drives_are_drawn_or_the_reason_is_told_in_a_sentence() -> None:
+    wanted = Set("paths.drives", "duration").apply(with_ends(open_state(OPTIMAL), None, GOAL))
+    html = drives_html(draw_drives(drives_request(Go().apply(wanted))))
+    assert "A motor that holds all this needs at least" in html
+    # A line of each actuator in the three charts over time and in that of force and speed.
+    assert html.count('<path d="M') == 24
+    between = Set("paths.drives", "duration").apply(start_between(0, 3))
+    assert "leaves the limits" in drives_html(draw_drives(drives_request(between)))

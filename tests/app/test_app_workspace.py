@@ -44,7 +44,7 @@ from explorer.numerics.number_text import UNITS, format_number
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions
-from explorer.statics.weights import design_weights, payload_wrench
+from explorer.statics.weights import MovingBodies, payload_wrench
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.position_bands import SHARE_COLOURS, SHARES, STEP_COLOURS
 from explorer.workspace.slices.outline import slice_outline
@@ -319,7 +319,7 @@ def load_state(design: Design = LOADED, forces: ForcesView = FORCES, **changes: 
 
 def shares_at(design: Design, points: FloatArray, rotation: FloatArray) -> FloatArray:
     """Return the largest shares of a limit at positions (n, 3), by reactions."""
-    tool, weights = design.tool.position, design_weights(design)
+    tool, weights = design.tool.position, MovingBodies().with_payload(design)
     held = reactions(Configuration(design, points, rotation, tool), np.array(LOAD), weights)
     return np.asarray(limit_shares(design, held).max(axis=-1))
 

@@ -25,7 +25,7 @@ BENCHMARKS: Mapping[str, str] = {
     "slider": "from the arrival of a slider's event to the last message of the scene",
     "interference": "overlap of tetrahedra, clearances of the legs, moves, accessible workspace",
     "nearest": "nearest singular pose of all three incidences",
-    "statics": "forces, bending, errors and compliance in many poses",
+    "statics": "forces, bending, motions, errors and compliance in many poses",
     "optimise": "optimal designs: iterations, precision, time, random starts",
     "studies": "many designs: a second, on two workers; memory of a million",
     "planning": "lines in the folds and paths between random poses of one mode",

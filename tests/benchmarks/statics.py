@@ -1,4 +1,4 @@
-"""Forces and precision of many poses, beside the same by NumPy's linear algebra."""
+"""Forces, motions and precision of many poses, beside the same by NumPy's linear algebra."""
 
 from __future__ import annotations
 
@@ -6,24 +6,34 @@ from collections.abc import Iterator
 
 import msgspec
 import numpy as np
+from machines import same_for_all
 
 from benchmarks.samples import DESIGN, around_home
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer import (
     Actuators,
+    Payload,
+    Pose,
     Struts,
     Tolerances,
     actuator_forces,
     deflection,
     inverse,
+    inverse_dynamics,
     jacobian,
+    joint_accelerations,
+    joint_rates,
     largest_force,
     strut_bending,
 )
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.compiled import warm
+from explorer.paths.time_law import DEFAULT_POINTS, law_of_shortest_time
+from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies
 from explorer.statics.accuracy import (
     actuator_errors,
     error_by_source,
@@ -58,6 +68,7 @@ def run() -> Iterator[Row]:
     """Yield the rows."""
     warm()
     yield from _forces()
+    yield from _motion()
     yield from _precision()
 
 
@@ -85,6 +96,47 @@ def _forces() -> Iterator[Row]:
     one = positions[0], rotations[0], loads[0]
     alone = best_of(100, lambda: actuator_forces(DESIGN, *one))
     yield Row("forces of the six actuators in one pose", seconds(alone))
+
+
+def _motion() -> Iterator[Row]:
+    positions, rotations, _ = around_home(FORCE_POSES)
+    rng = np.random.default_rng(2)
+    twists, accelerations = rng.normal(size=(2, FORCE_POSES, 6))
+    motions = positions, rotations, twists, accelerations
+    carrying = msgspec.structs.replace(DESIGN, payload=Payload(2.0, (0.5, 0.0, 1.0)))
+    ours = best_of(ROUNDS, lambda: inverse_dynamics(carrying, *motions))
+    centre, metres = np.array(carrying.payload.centre), 1e-3 * carrying.unit_mm
+    gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY]) / metres
+
+    def plain() -> object:
+        arms, turning = rotations @ centre, twists[:, 3:]
+        fall = gravity - accelerations[:, :3] - np.cross(accelerations[:, 3:], arms)
+        force = (
+            metres * carrying.payload.mass_kg * (fall - np.cross(turning, np.cross(turning, arms)))
+        )
+        load = np.concatenate([force, np.cross(arms, force)], axis=1)
+        transposed = np.swapaxes(jacobian(carrying, positions, rotations), -1, -2)
+        return np.linalg.solve(transposed, -load[..., None])
+
+    theirs = best_of(3, plain)
+    yield Row(
+        f"inverse dynamics with legs in {FORCE_POSES:,} motions, one core",
+        seconds(ours),
+        "150 ms",
+        f"NumPy, the payload alone: {seconds(theirs)}; {times(theirs / ours)}",
+    )
+    rates = best_of(3, lambda: joint_rates(DESIGN, *motions[:3]))
+    yield Row(f"rates of the joints in {FORCE_POSES:,} motions", seconds(rates))
+    changes = best_of(3, lambda: joint_accelerations(DESIGN, *motions))
+    yield Row(f"accelerations of the joints in {FORCE_POSES:,} motions", seconds(changes))
+    home = carrying.home_pose
+    way = home, Pose(triple(np.array(home.position) + (2.0, -1.0, 1.0)), home.quaternion)
+    force, speed, acceleration = map(same_for_all, (100.0, 300.0, 5000.0))
+    limits = Actuators(force, speed_mm_s=speed, acceleration_mm_s2=acceleration)
+    timed = msgspec.structs.replace(carrying, actuators=limits)
+    bodies = moving_bodies(timed, bar_masses(timed, DENSITY))
+    shortest = best_of(3, lambda: law_of_shortest_time(timed, StraightMoves.along(way), bodies))
+    yield Row(f"shortest time of a path of {DEFAULT_POINTS} points", seconds(shortest), "0.2 s")
 
 
 def _precision() -> Iterator[Row]:

@@ -54,6 +54,18 @@ def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) ->
     assert "least |δ|" in text
 
 
+def test_path_with_an_acceleration_starts_and_ends_at_rest(cli: CommandLine) -> None:
+    words = ["--to", "12", "8", "7", "--speed", "2", "--samples", "401"]
+    at_once, found = cli.answer(*words), cli.answer(*words, "--acceleration", "8")
+    # The way up to the speed and down from it takes speed / acceleration longer.
+    assert found["duration"] == pytest.approx(at_once["duration"] + 0.25, rel=1e-3)
+    speeds = np.abs(np.diff(found["trajectory"]["joints"], axis=0)).max(axis=1) / (
+        found["duration"] / 400.0
+    )
+    assert speeds.max() == pytest.approx(2.0, rel=1e-3)
+    assert speeds[[0, -1]].max() < 0.02
+
+
 @pytest.mark.parametrize(
     "words",
     [

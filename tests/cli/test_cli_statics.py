@@ -16,7 +16,7 @@ from explorer.measures.box import positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import typical_machine
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.weights import machine_weights
+from explorer.prototype.weights import moving_bodies
 from explorer.statics.accuracy import (
     SOURCES,
     actuator_errors,
@@ -99,7 +99,7 @@ def test_where_a_load_is_not_held_the_nearest_position_is_told(cli: CommandLine)
 
 def test_parts_of_the_prototype_weigh_in_place_of_bars(cli: CommandLine) -> None:
     design = explorer.PRESETS["paper-optimal"]
-    weights = machine_weights(design, make_prototype(design).masses(2700.0), payload=False)
+    weights = moving_bodies(design, make_prototype(design).masses(2700.0), payload=False)
     carried = carry(Configuration(design, *AT), weights).wrench
     expected = explorer.actuator_forces(design, *AT, carried)
     found = cli.answer("forces", *POSE, "--density", "2700", "--parts")

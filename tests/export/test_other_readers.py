@@ -20,7 +20,7 @@ from explorer.export.simulation import DENSITY, SIMULATION_JOINTS, SimulationMod
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
-from explorer.prototype.weights import bar_masses, machine_weights
+from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics.loaded import LoadedPose
 
 pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("default")]
@@ -50,7 +50,7 @@ def poses(design: Design) -> Iterator[tuple[FloatArray, FloatArray]]:
 
 
 def forces_of_statics(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
-    weights = machine_weights(design, bar_masses(design, DENSITY), payload=False)
+    weights = moving_bodies(design, bar_masses(design, DENSITY), payload=False)
     loaded = LoadedPose(design, Pose.of(position, rotation), own=weights)
     return loaded.reactions.actuators
 

@@ -14,12 +14,14 @@ from report_page import Node, read, table_of
 import explorer
 from explorer import Actuators, Design, Guide, Payload, Pose, Struts, Tool
 from explorer.app.features.sharing.reporting import make_report
+from explorer.export.pose_tables import parse_table, read_poses
 from explorer.export.report.data import ReportData
 from explorer.export.report.workspace import worst_payload_force
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
+from explorer.prototype.dynamics import TimedPath, drives_along
 from explorer.statics.reactions import Reactions, limit_shares
-from explorer.statics.weights import design_weights
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.carried_region import carried_region
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -71,7 +73,7 @@ def loaded_page(seed: int) -> Node:
 
 def reactions_at_home(design: Design) -> Reactions:
     home = design.home_pose
-    weights = design_weights(design)
+    weights = MovingBodies().with_payload(design)
     tool = design.tool.position
     return explorer.reactions(explorer.Configuration.at(design, home, tool), ZERO, weights)
 
@@ -207,3 +209,21 @@ def test_report_commands_of_a_tool_place_the_tool() -> None:
     told = [line for line in lines if line.startswith(("explorer forces", "explorer accuracy"))]
     assert len(told) == 2
     assert all(f"--position {words} " in line and line.endswith("--at tool") for line in told)
+
+
+def test_report_of_a_path_has_its_drives_and_the_corners_that_give_them_again() -> None:
+    home = OPTIMAL.home_pose
+    path = TimedPath((home, Pose((12.0, 4.0, 8.0), home.quaternion)), 0.5)
+    section = section_of(read(make_report(OPTIMAL, path=path).decode()), "Drives")
+    rows, found = table_of(section, "Actuators along the path"), drives_along(OPTIMAL, path)
+    expected = found.figures[:3]
+    for joint, *values in zip(JOINTS, *expected, strict=True):
+        assert rows[joint].values[:3] == pytest.approx(values)
+    (corners,) = (each.text for each in section.all("pre"))
+    table = parse_table("corners.csv", corners.encode(), OPTIMAL.unit_mm)
+    again = read_poses(table, OPTIMAL, home.rotation)
+    np.testing.assert_allclose(again.position, [pose.position for pose in path.poses])
+    np.testing.assert_allclose(again.rotation, [pose.rotation for pose in path.poses], atol=1e-12)
+    far = TimedPath((home, Pose((10.0, 40.0, 8.0), home.quaternion)), 0.5)
+    refused = section_of(read(make_report(OPTIMAL, path=far).decode()), "Drives").text
+    assert "leaves the limits" in refused

@@ -33,7 +33,7 @@ from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.imperfect import ImperfectMachine
-from explorer.prototype.weights import bar_masses, machine_weights
+from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics.accuracy import SOURCES
 from explorer.statics.loaded import LoadedPose
 
@@ -186,7 +186,7 @@ def test_servos_at_rest_give_the_forces_of_statics(design: Design, masses: str) 
         found = make_prototype(design).masses(2700.0)
     given = SimulationModel(design, masses=found)
     model = model_of(given.text())
-    weights = machine_weights(design, found, payload=False)
+    weights = moving_bodies(design, found, payload=False)
     home, metres = design.home_pose, 1e-3 * design.unit_mm
     rng = np.random.default_rng(5)
     for share in (0.0, 0.05, 0.05):

@@ -15,7 +15,6 @@ from explorer import PRESETS, Design, InputError, Pose
 from explorer.mechanism.design import Swing
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.optimise.problem import OBJECTIVES, Demands, Problem, Variable
-from explorer.statics.weights import Weights
 from explorer.sweep.study import Objective, Polish, Sampling, Study, decode_study, encode_study
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -44,7 +43,6 @@ STUDY = Study(
     chunk=4,
 )
 SAMPLING = Sampling(method="latin-hypercube", count=16, seed=3)
-WEIGHTS = Weights(carriages=(0.1, 0.2, 0.3, 0.4), rods=(1.0, 2.0, 3.0, 4.0))
 
 
 def of_numpy(value: Any, *, arrays: bool) -> Any:
@@ -105,7 +103,7 @@ def test_pose_of_whole_numbers_is_that_of_floats(position: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "value", [LIMITED, PROBLEM, STUDY, SAMPLING, WEIGHTS], ids=lambda v: type(v).__name__
+    "value", [LIMITED, PROBLEM, STUDY, SAMPLING], ids=lambda v: type(v).__name__
 )
 def test_value_of_numpy_numbers_is_that_of_plain_ones(value: Any) -> None:
     check_plain(value)

@@ -190,9 +190,10 @@ class Reader:
             for line in text.splitlines() if self.output is not None else ():
                 assert line in str(self.output).splitlines(), line
         else:
-            assert kind == "json", f"no way to run {kind}"
-            file = re.findall(r"`([\w-]+\.json)`", before)[-1]
-            msgspec.json.decode(text)
+            assert kind in ("json", "csv"), f"no way to run {kind}"
+            file = re.findall(rf"`([\w-]+\.{kind})`", before)[-1]
+            if kind == "json":
+                msgspec.json.decode(text)
             Path(file).write_text(text, encoding="utf-8")
 
     def enter(self, line: str) -> str | None:

@@ -181,7 +181,7 @@ def test_objective_of_a_search_is_the_measure_that_it_is_named_after(
     if objective in OVER_BOX:
         design = msgspec.structs.replace(
             design,
-            payload=Payload(force_n=3.0),
+            payload=Payload(0.1, force_n=3.0),
             actuators=Actuators(push_n=same_for_all(9.0), error_mm=same_for_all(0.01)),
             struts=Struts(outer_mm=12.0),
         )

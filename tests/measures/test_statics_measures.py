@@ -18,14 +18,15 @@ from explorer.mechanism.design import VARIABLES
 from explorer.numerics.number_text import Unit
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, stiffness_of
-from explorer.statics.reactions import limit_shares
-from explorer.statics.weights import design_weights, payload_wrench
+from explorer.statics.reactions import largest_accelerations, limit_shares
+from explorer.statics.weights import MovingBodies, payload_wrench
 
 OPTIMAL = PRESETS["paper-optimal"]
 BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
 NAMES = (
     *("load_share", "worst_actuator", "largest_payload"),
-    *("largest_bending", "worst_error", "worst_turn", "softest_compliance", "deflection"),
+    *("acceleration", "largest_bending", "worst_error", "worst_turn", "softest_compliance"),
+    "deflection",
 )
 WITH_GRADIENT = tuple(name for name in NAMES if name not in ("worst_actuator", "largest_payload"))
 
@@ -41,11 +42,11 @@ def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
     found = {name: value or math.nan for name, value in values(PRECISE).items()}
     assert tuple(found) == NAMES
     units = [CATALOGUE[name].unit_in(Unit("mm", 1.0)).name for name in NAMES]
-    assert units == ["", "", "kg", "N m", "mm", "°", "mm/N", "mm"]
+    assert units == ["", "", "kg", "m/s²", "N m", "mm", "°", "mm/N", "mm"]
     rotation = PRECISE.home_pose.rotation
     positions = np.random.default_rng(1).uniform(*BOX, (1000, 3))
     given = PRECISE, positions, rotation
-    held = reactions(Configuration(*given), np.zeros(6), design_weights(PRECISE))
+    held = reactions(Configuration(*given), np.zeros(6), MovingBodies().with_payload(PRECISE))
     shares = limit_shares(PRECISE, held)
     poses = Configuration(*given, PRECISE.tool.position)
     soft = compliance_of(poses, *stiffness_of(PRECISE))
@@ -64,6 +65,8 @@ def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
         # The largest values lie at the border of the box, most of them at a corner.
         assert 0.7 * found[name] < value <= 1.001 * found[name], name
     assert found["worst_actuator"] == shares[:, :6].max(axis=0).argmax() + 1
+    accelerations = largest_accelerations(poses).min()
+    assert found["acceleration"] <= accelerations < 1.3 * found["acceleration"]
     # Without another load, shares are proportional to the mass.
     assert found["largest_payload"] == pytest.approx(0.6 / found["load_share"], rel=1e-9)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from machines import FULL
 
-from explorer import PRESETS, Configuration, forward
+from explorer import PRESETS, Configuration, forward, inverse_dynamics
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import KERNELS, warm
 from explorer.singularity.nearest import nearest_singular_poses
@@ -56,6 +56,9 @@ CASES: dict[str, Callable[[], FloatArray]] = {
     "forward": lambda: forward(OPTIMAL, joints()).position,
     "nearest": lambda: nearest_singular_poses(Configuration(OPTIMAL, positions(), ROTATION))[0],
     "forces": lambda: actuator_forces(OPTIMAL, positions(), ROTATION, np.arange(1.0, 7.0)),
+    "motion": lambda: inverse_dynamics(
+        OPTIMAL, positions(), ROTATION, np.arange(1.0, 7.0), np.arange(7.0, 1.0, -1.0)
+    ),
     "slopes": lambda: twist_slopes(FULL, positions(), ROTATION).by,
 }
 

@@ -563,6 +563,7 @@ def test_smallest_load_that_must_be_held_converges_only_where_it_is(most: float)
         ({"struts": Struts()}, {"held": True}, "limits neither its actuators nor its struts"),
         ({}, {"error": 0.1}, "the actuators of the design have no errors"),
         ({"payload": Payload()}, {"deflection": 0.1}, "the design has no load"),
+        ({}, {"acceleration": 9.0}, "the design has no mass to accelerate: give its payload"),
         ({"struts": Struts()}, {"deflection": 0.1}, "the design is rigid: give its actuators"),
         ({}, {"deflection": 0.0}, "the deflection demanded must be positive"),
         ({}, {"tilt": 95.0}, "the tilt demanded must be below 90°; got 95°"),

@@ -84,6 +84,7 @@ def problems(name: str) -> Iterator[Problem]:
             required_box=REQUIRED,
             held=True,
             error=0.01,
+            acceleration=5.0,
             # It has hundreds of conditions, which one of the problems shows.
             tilt=12.0 if "reach" in free else None,
             free=free,
@@ -114,7 +115,16 @@ def test_gradients_of_demands_match_central_differences(name: str) -> None:
     for seed, problem in enumerate(problems(name)):
         model = Model(problem, problem.start_values)
         kinds = {name.split(" ")[0] for name in model.names}
-        assert kinds >= {"volume", "longest", "distance", "required", "margin", "load", "error"}
+        assert kinds >= {
+            "volume",
+            "longest",
+            "distance",
+            "required",
+            "margin",
+            "load",
+            "error",
+            "acceleration",
+        }
         for u in points(model, POINTS, seed):
             rows = [(a.values - b.values) / (2.0 * STEP) for a, b in around(model, u)]
             found = np.column_stack(rows)

@@ -37,7 +37,12 @@ from explorer.optimise.solver import optimise_design
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
-DEMANDS: tuple[dict[str, Any], ...] = ({"held": True}, {"error": 0.01}, {"deflection": 0.05})
+DEMANDS: tuple[dict[str, Any], ...] = (
+    {"held": True},
+    {"error": 0.01},
+    {"deflection": 0.05},
+    {"acceleration": 2.0},
+)
 # Places of the near face of a box, beyond a plane where they are negative.
 BESIDE = (-0.5, -1e-3, -1e-9, 0.0, 1e-9, 1e-3)
 # Orientations by yaw, pitch and roll; where the platform is level, two planes are the same.
@@ -51,7 +56,7 @@ def machine(turn: Triple = TURNS[0], margin: float | None = None, source: Any = 
         start,
         home=Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), turn),
         limits=msgspec.structs.replace(start.limits, box=None, margin=margin),
-        payload=Payload(force_n=10.0),
+        payload=Payload(1.0, force_n=10.0),
         actuators=Actuators(
             push_n=same_for_all(150.0),
             error_mm=same_for_all(0.02),

@@ -14,6 +14,7 @@ from limited_designs import limited
 from long_cases import long_after
 from machines import six
 from scipy.spatial.transform import Rotation
+from statics_cases import LegMasses
 from tool_moves import tool_move
 
 from explorer import (
@@ -38,7 +39,7 @@ from explorer.paths.crossings import path_margins
 from explorer.paths.loads import TOLERANCE, DemandedLoad, path_loads
 from explorer.paths.planning import NoPathError, plan_path
 from explorer.statics.reactions import limit_shares, reactions
-from explorer.statics.weights import Weights, design_weights
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
@@ -70,7 +71,7 @@ def random_machine(design: Design, seed: int, strength: float = 1.0) -> Design:
     )
 
 
-def random_weights(design: Design, seed: int) -> Weights:
+def random_weights(design: Design, seed: int) -> MovingBodies:
     """Return weights of all bodies of a design, its payload included."""
     rng = np.random.default_rng([1, seed])
 
@@ -78,14 +79,14 @@ def random_weights(design: Design, seed: int) -> Weights:
         a, b, c, d = rng.uniform(0.0, 2.0, 4).tolist()
         return a, b, c, d
 
-    return Weights(
-        on_platform=(design.payload, Payload(1.0, (1.0, 2.0, 3.0))),
+    legs = LegMasses(
         carriages=four(),
         cylinders=four(),
         cylinder_centres=four(),
         rods=four(),
         rod_centres=four(),
     )
+    return legs.bodies.with_payload(design).with_mass(1.0, (1.0, 2.0, 3.0))
 
 
 def random_move(pose: Pose, seed: int, size: float, angle: float) -> tuple[Pose, Pose]:
@@ -109,13 +110,13 @@ def dense_shares(
     design: Design,
     move: tuple[Pose, Pose],
     load: FloatArray,
-    weights: Weights | None,
+    weights: MovingBodies | None,
     tool: FloatArray,
 ) -> FloatArray:
     """Return the shares of the limits at dense samples of a move, shape (n, 12)."""
     positions, rotations = tool_move(*move, DENSE, tool)
     given = Configuration(design, positions, rotations, design.tool.position), load
-    return limit_shares(design, reactions(*given, weights or design_weights(design)))
+    return limit_shares(design, reactions(*given, weights or MovingBodies().with_payload(design)))
 
 
 @pytest.mark.parametrize("seed", long_after(8, range(40)))
@@ -140,7 +141,8 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     # The part and the place are those of the share that is told.
     there = tool_move(*move, along.place, tool)
     given = Configuration(design, *there, design.tool.position), load
-    here = limit_shares(design, reactions(*given, weights or design_weights(design)))[0]
+    bodies = weights or MovingBodies().with_payload(design)
+    here = limit_shares(design, reactions(*given, bodies))[0]
     assert here[along.part] == here.max() == pytest.approx(along.share, rel=1e-10)
 
 
@@ -208,7 +210,7 @@ def test_holds_along_is_true_below_the_bound_and_false_above_the_largest_share(s
 
 THICK = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)
 needs_ompl = pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
-Case = tuple[Design, FloatArray, Weights | None, Pose, Pose]
+Case = tuple[Design, FloatArray, MovingBodies | None, Pose, Pose]
 
 
 @cache
@@ -247,7 +249,7 @@ def densest(case: Case, poses: tuple[Pose, ...], at: Triple = (0.0, 0.0, 0.0)) -
         positions, rotations = tool_move(start, end, np.linspace(0.0, 1.0, 300), tool)
         assert poses_are_valid(design, positions, rotations).all()
         given = Configuration(design, positions, rotations, design.tool.position), load
-        held = reactions(*given, weights or design_weights(design))
+        held = reactions(*given, weights or MovingBodies().with_payload(design))
         most = max(most, float(limit_shares(design, held).max()))
     return most
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import msgspec
 import numpy as np
 import pytest
@@ -11,7 +9,7 @@ from differences import moved
 from numpy.testing import assert_allclose
 from refusals import refusal
 from scipy.spatial.transform import Rotation
-from statics_cases import CASES, random_poses
+from statics_cases import CASES, LegMasses, random_poses
 
 from explorer import (
     PRESETS,
@@ -38,7 +36,7 @@ from explorer.numerics.compiled import MANY_ROWS
 from explorer.statics.forces import twists_of_actuators, worst_direction
 from explorer.statics.reactions import limit_shares
 from explorer.statics.slopes import PARAMETERS, twist_slopes
-from explorer.statics.weights import Weights, carry
+from explorer.statics.weights import MovingBodies, carry
 
 OPTIMAL = PRESETS["paper-optimal"]
 LIMITED = msgspec.structs.replace(
@@ -51,19 +49,20 @@ LIMITED = msgspec.structs.replace(
     struts=Struts(outer_mm=12.0, inner_mm=9.0, stress_mpa=250.0),
     guide=Guide(force_n=260.0, moment_nm=22.0),
 )
-WEIGHTS = Weights(
-    on_platform=(Payload(0.4, (1.0, -0.5, 0.2)),),
+BODY = Payload(0.4, (1.0, -0.5, 0.2))
+LEGS = LegMasses(
     carriages=(0.0, 0.15, 0.2, 0.0),
     cylinders=(0.3, 0.25, 0.35, 0.2),
     cylinder_centres=(2.0, 1.5, 1.0, 2.5),
     rods=(0.1, 0.15, 0.12, 0.08),
     rod_centres=(2.5, 1.0, 2.0, 1.5),
 )
+WEIGHTS = LEGS.bodies.with_mass(BODY.mass_kg, BODY.centre)
 
 
 MASSES = [
-    *(body.mass_kg for body in WEIGHTS.on_platform),
-    *np.transpose((WEIGHTS.carriages, WEIGHTS.cylinders, WEIGHTS.rods)).ravel().tolist(),
+    BODY.mass_kg,
+    *np.transpose((LEGS.carriages, LEGS.cylinders, LEGS.rods)).ravel().tolist(),
 ]
 GRAVITIES = ((0.0, 0.0, -1.0), (1.0, 2.0, -0.5))
 
@@ -100,13 +99,13 @@ def test_twists_of_actuators_invert_the_jacobian() -> None:
 def centres(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
     """Return the centres of all masses, in the order of `MASSES`, from the geometry of the legs."""
     at = Configuration(design, position, rotation).points
-    points = [position + rotation @ np.array(body.centre) for body in WEIGHTS.on_platform]
+    points = [position + rotation @ np.array(BODY.centre)]
     foot2, foot3 = at.b2 * [1.0, 0.0, 0.0], at.b3 * [1.0, 0.0, 0.0]
     legs = [(at.a1, at.b1), (foot2, at.b2), (foot3, at.b3), (at.a3, at.b4)]
     for leg, (base, end) in enumerate(legs):
         axis = (end - base) / np.linalg.norm(end - base)
-        points += [base, base + WEIGHTS.cylinder_centres[leg] * axis]
-        points += [end - WEIGHTS.rod_centres[leg] * axis]
+        points += [base, base + LEGS.cylinder_centres[leg] * axis]
+        points += [end - LEGS.rod_centres[leg] * axis]
     return np.array(points)
 
 
@@ -138,8 +137,7 @@ def test_joint_forces_balance_the_platform_and_each_leg(gravity: Triple) -> None
     for k, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
         at = Configuration(design, position, rotation).points
         ends = [at.b1, at.b2, at.b3, at.b4]
-        body = WEIGHTS.on_platform[0]
-        centre, weight = rotation @ np.array(body.centre), body.mass_kg * g
+        centre, weight = rotation @ np.array(BODY.centre), BODY.mass_kg * g
         force = load[:3] + weight + held.joints[k].sum(axis=0)
         arms = np.array([end - position for end in ends])
         moment = load[3:] + np.cross(centre, weight)
@@ -151,13 +149,13 @@ def test_joint_forces_balance_the_platform_and_each_leg(gravity: Triple) -> None
         for leg in (1, 2):
             carriage, cylinder, rod = points[1 + 3 * leg : 4 + 3 * leg]
             on_strut = np.cross(ends[leg] - carriage, -held.joints[k, leg])
-            on_strut += np.cross(cylinder - carriage, WEIGHTS.cylinders[leg] * g)
-            on_strut += np.cross(rod - carriage, WEIGHTS.rods[leg] * g)
+            on_strut += np.cross(cylinder - carriage, LEGS.cylinders[leg] * g)
+            on_strut += np.cross(rod - carriage, LEGS.rods[leg] * g)
             bending = held.bending[k, leg - 1]
             # The carriage turns freely about the guide.
             assert on_strut[0] == pytest.approx(0.0, abs=1e-9 * scale)
             assert np.linalg.norm(on_strut) == pytest.approx(bending, rel=1e-9, abs=1e-9 * scale)
-            total = (WEIGHTS.carriages[leg] + WEIGHTS.cylinders[leg] + WEIGHTS.rods[leg]) * g
+            total = (LEGS.carriages[leg] + LEGS.cylinders[leg] + LEGS.rods[leg]) * g
             across = (total - held.joints[k, leg])[1:]
             assert np.linalg.norm(across) == pytest.approx(held.guide_force[k, leg - 1], rel=1e-9)
 
@@ -188,8 +186,7 @@ def test_largest_payload_uses_a_limit_up_and_keeps_all() -> None:
 
     def largest_share(k: int, mass: float) -> float:
         """Return the largest share of a limit in a pose under a payload."""
-        payload = Payload(mass, LIMITED.payload.centre)
-        weights = replace(WEIGHTS, on_platform=(*WEIGHTS.on_platform, payload))
+        weights = WEIGHTS.with_mass(mass, LIMITED.payload.centre)
         held = reactions(Configuration(LIMITED, positions[k], rotations[k]), load, weights)
         return float(limit_shares(LIMITED, held).max())
 
@@ -212,7 +209,7 @@ def test_mass_may_hold_a_load_that_exceeds_a_limit_alone() -> None:
     most = float(largest_payload(at_home, load))
     assert most > float(largest_payload(at_home)) > 0.0
     for factor, kept in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
-        weights = Weights(on_platform=(Payload(most * factor, LIMITED.payload.centre),))
+        weights = MovingBodies().with_mass(most * factor, LIMITED.payload.centre)
         held = reactions(at_home, load, weights)
         assert (limit_shares(LIMITED, held).max() <= 1.0) == kept
 

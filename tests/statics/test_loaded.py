@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from machines import FULL, six
 from numpy.testing import assert_allclose
+from statics_cases import LegMasses
 
 from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Tolerances, Tool
 from explorer.mechanism.configuration import Configuration
@@ -15,11 +16,11 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import limit_shares, limited_parts, reactions
-from explorer.statics.weights import Weights, design_weights
+from explorer.statics.weights import MovingBodies
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose
-OWN = Weights(cylinders=(0.1, 0.2, 0.15, 0.1), cylinder_centres=(1.0, 1.0, 2.0, 3.0))
+OWN = LegMasses(cylinders=(0.1, 0.2, 0.15, 0.1), cylinder_centres=(1.0, 1.0, 2.0, 3.0)).bodies
 
 
 def limited(**changes: object) -> Design:
@@ -115,7 +116,7 @@ def positions(count: int) -> FloatArray:
 
 def shares(design: Design, at: FloatArray, load: FloatArray) -> FloatArray:
     """Return the shares of the limits under a load at the tool, besides the payload's weight."""
-    weights = design_weights(design)
+    weights = MovingBodies().with_payload(design)
     held = reactions(Configuration(design, at, ROTATION, design.tool.position), load, weights)
     return limit_shares(design, held)
 

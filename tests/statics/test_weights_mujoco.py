@@ -7,17 +7,17 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from mujoco_models import engine, joints_of, loops_of
+from mujoco_models import engine, joints_of, loops_of, random_design
 from numpy.testing import assert_allclose
 from statics_cases import random_poses
 
 from explorer import PRESETS, Design, Payload, actuator_forces
 from explorer.export.simulation import DENSITY, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import DOWN, VARIABLES
+from explorer.mechanism.design import DOWN
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.prototype.chains import ACTUATED
-from explorer.prototype.weights import bar_masses, machine_weights
+from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics.weights import carry
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -42,22 +42,6 @@ def apply_load(design: Design, model: Any, data: Any) -> None:
     engine.mj_applyFT(model, data, force, moment, point, platform.id, data.qfrc_applied)
 
 
-def random_design(seed: int) -> Design:
-    """Return a design about the optimum, with random payload, gravity and radii of the legs."""
-    rng = np.random.default_rng(seed)
-    design = OPTIMAL
-    for name, value in zip(VARIABLES, design.variables, strict=True):
-        design = design.with_variable(name, value * rng.uniform(0.8, 1.2))
-    limits = msgspec.structs.replace(design.limits, leg_radii=tuple(rng.uniform(0.1, 0.6, 4)))
-    return msgspec.structs.replace(
-        design,
-        limits=limits,
-        unit_mm=float(rng.choice([5.0, 10.0, 40.0])),
-        payload=Payload(rng.uniform(0.1, 3.0), tuple(rng.normal(size=3) * 2.0)),
-        gravity=tuple(rng.normal(size=3)),
-    )
-
-
 DESIGNS = [THICK, TILTED, *map(random_design, range(4))]
 
 
@@ -66,7 +50,7 @@ def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design)
     model = engine.MjModel.from_xml_string(simulation_mjcf(design))
     # Gravity is that of the scene, MuJoCo's own 9.81 m/s².
     model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
-    weights = machine_weights(design, bar_masses(design, DENSITY))
+    weights = moving_bodies(design, bar_masses(design, DENSITY))
     data = engine.MjData(model)
     positions, rotations = random_poses(design, 10, seed=2)
     for position, rotation in zip(positions, rotations, strict=True):

@@ -4,15 +4,40 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
 import mujoco  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 
-from explorer.mechanism.design import JOINTS, Design
+from explorer import PRESETS, Payload
+from explorer.mechanism.design import JOINTS, VARIABLES, Design
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, CHAIN_JOINTS, Chains
 
 engine: Any = mujoco
+
+
+OPTIMAL = PRESETS["paper-optimal"]
+
+
+def random_design(seed: int) -> Design:
+    """Return a design about the optimum, with random payload, gravity and radii of the legs."""
+    rng = np.random.default_rng(seed)
+    design = OPTIMAL
+    for name, value in zip(VARIABLES, design.variables, strict=True):
+        design = design.with_variable(name, value * rng.uniform(0.8, 1.2))
+    limits = msgspec.structs.replace(design.limits, leg_radii=tuple(rng.uniform(0.1, 0.6, 4)))
+    return msgspec.structs.replace(
+        design,
+        limits=limits,
+        unit_mm=float(rng.choice([5.0, 10.0, 40.0])),
+        payload=Payload(
+            rng.uniform(0.1, 3.0),
+            tuple(rng.normal(size=3) * 2.0),
+            inertia_kg_mm2=tuple(rng.uniform(0.5, 1.0, 3) * 1e3),
+        ),
+        gravity=tuple(rng.normal(size=3)),
+    )
 
 
 def at_home(model: Any, key: str = "home") -> Any:

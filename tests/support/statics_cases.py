@@ -11,6 +11,40 @@ from scipy.spatial.transform import Rotation
 
 from explorer import Design, margins, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.weights import (
+    AXIS_X,
+    MOMENT,
+    ON_GUIDE,
+    ROD,
+    ROD_CENTRE,
+    TOTAL,
+    MovingBodies,
+)
+
+
+@dataclass(frozen=True)
+class LegMasses:
+    """Masses in kg of the parts of four legs, with the distances of their centres.
+
+    Those of the cylinders are from the base joints, those of the rods back from the platform.
+    """
+
+    carriages: tuple[float, ...] = (0.0,) * 4
+    cylinders: tuple[float, ...] = (0.0,) * 4
+    cylinder_centres: tuple[float, ...] = (0.0,) * 4
+    rods: tuple[float, ...] = (0.0,) * 4
+    rod_centres: tuple[float, ...] = (0.0,) * 4
+
+    @property
+    def bodies(self) -> MovingBodies:
+        """The legs as bodies; the carriages of legs 1 and 4 do not move."""
+        rows = np.zeros((4, 11))
+        carriages = np.where(ON_GUIDE, self.carriages, 0.0)
+        rows[:, TOTAL] = carriages + self.cylinders + np.array(self.rods)
+        rows[:, ROD], rows[:, ROD_CENTRE] = self.rods, self.rod_centres
+        rows[:, MOMENT] = np.multiply(self.cylinders, self.cylinder_centres)
+        rows[:, AXIS_X] = 1.0
+        return MovingBodies(legs=rows)
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.statics.load_cases import largest_shares as shares_of_case, load_case
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, limit_shares
-from explorer.statics.weights import design_weights
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.limits.constraints import constraints, satisfies, slacks
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
@@ -68,7 +68,7 @@ def largest_shares(
 ) -> FloatArray:
     """Return the largest share of a limit at positions (n, 3), in home's orientation if none."""
     r = design.home_pose.rotation if rotation is None else rotation
-    weights = design_weights(design)
+    weights = MovingBodies().with_payload(design)
     held = reactions(Configuration(design, at, r, design.tool.position), np.array(load), weights)
     return np.asarray(limit_shares(design, held).max(axis=1))
 

@@ -16,7 +16,7 @@ from explorer.mechanism.margins import planes_of_singularity
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.reactions import limit_shares
-from explorer.statics.weights import design_weights
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.position_bands import (
     LOAD_MEASURES,
     MEASURE_WORDS,
@@ -69,7 +69,7 @@ def asked(design: Design, points: FloatArray, rotation: FloatArray, measure: str
     """Return what the load asks at positions (n, 3), by reactions."""
     if measure == "error":
         return largest_displacement(design, points, rotation)
-    tool, weights = design.tool.position, design_weights(design)
+    tool, weights = design.tool.position, MovingBodies().with_payload(design)
     held = reactions(Configuration(design, points, rotation, tool), LOAD, weights)
     if measure == "deflection":
         return displacement(design, points, rotation, held.actuators)

@@ -31,6 +31,9 @@ Mode = Annotated[int, msgspec.Meta(ge=0, le=7)]
 PathKind = Literal["straight", "planned"]
 """The straight move between two poses, or a path without a singular pose."""
 
+PathDrives = Literal["off", "shortest", "duration"]
+"""Whether speeds and forces along the path are computed, and in which time."""
+
 End: TypeAlias = Pose | Mode | None
 """An end of a path: a fixed pose, or an assembly mode of the present leg lengths.
 
@@ -108,13 +111,16 @@ class Paths:
         kind: Kind of the next path.
         seconds: Longest time of planning, in seconds.
         holds_load: Whether a planned path holds the load of the page all along.
+        drives: Whether speeds and forces of the actuators are computed, in the shortest time or a
+            given one.
+        duration: The given time, in seconds.
         request: Number of the last request to plan; 0 before the first.
         planning: Start and goal of the path that is being planned; None if none is.
         problem: Why planning failed; None if it did not.
         journey: The present path; None if there is none.
 
     Raises:
-        InputError: A time for planning that is not above zero.
+        InputError: A time for planning or for the path that is not above zero.
     """
 
     start: End = None
@@ -122,16 +128,19 @@ class Paths:
     kind: PathKind = "straight"
     seconds: float = DEFAULT_SECONDS
     holds_load: bool = False
+    drives: PathDrives = "off"
+    duration: float = 1.0
     request: int = field(default=0, metadata=TRANSIENT)
     planning: tuple[Pose, Pose] | None = field(default=None, metadata=TRANSIENT)
     problem: str | None = field(default=None, metadata=TRANSIENT)
     journey: Journey | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.seconds) and self.seconds > 0.0):
-            raise InputError(
-                f"planning needs a time above zero; got {format_number(self.seconds)} seconds"
-            )
+        for what, seconds in (("planning", self.seconds), ("a path", self.duration)):
+            if not (math.isfinite(seconds) and seconds > 0.0):
+                raise InputError(
+                    f"{what} needs a time above zero; got {format_number(seconds)} seconds"
+                )
 
     @property
     def is_planning(self) -> bool:

@@ -257,9 +257,16 @@ class State:
 
     @property
     def journey(self) -> Journey | None:
-        """The present path; None where there is none, or one made for another design."""
-        journey = self.paths.journey
-        return journey if journey is not None and journey.design == self.design else None
+        """The present path; None where there is none, or one made for another design.
+
+        It stays while a payload and actuators are chosen for it.
+        """
+        journey, new = self.paths.journey, self.design
+        if journey is None or journey.design == new:
+            return journey
+        carrying = {"payload": new.payload, "actuators": new.actuators}
+        is_for_it = msgspec.structs.replace(journey.design, **carrying) == new
+        return replace(journey, design=new) if is_for_it else None
 
     @property
     def warn_below(self) -> float:

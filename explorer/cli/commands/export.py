@@ -29,6 +29,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.imperfect import ImperfectMachine
+from explorer.prototype.weights import DENSITY
 from explorer.statics import accuracy
 from explorer.workspace.solids.solid import convex_hull
 from explorer.workspace.solids.solids import workspace_solid
@@ -217,7 +218,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
         check_extra("cad")
     prototype = make_prototype(command.read_design())
     data = assembly.assembly_bytes(prototype, file_format)
-    bill = bill_of_materials(prototype, command.density or simulation.DENSITY)
+    bill = bill_of_materials(prototype, command.density or DENSITY)
     part_keys = ["name", "size_mm", "volume_mm3", "mass_kg"]
     actuator_keys = ["leg", "stroke_mm", "asked_mm", "diameter_mm", "mass_kg"]
     return data, {
@@ -237,7 +238,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
 def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
-    design, density = command.read_design(), command.density or simulation.DENSITY
+    design, density = command.read_design(), command.density or DENSITY
     masses = make_prototype(design).masses(density) if command.masses == "parts" else None
     given: Design | ImperfectMachine = design
     facts: Facts = {}

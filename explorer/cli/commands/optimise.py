@@ -84,6 +84,10 @@ class Optimise(options.JsonOptions, options.DesignOptions):
     """Largest displacement of the tool under payload and force over the required box, in design
     units."""
 
+    acceleration: Annotated[values.Positive, values.OPTIONAL] = None
+    """Acceleration from rest, in every direction over the required box, that the limits of forces
+    and moments allow with the payload, in m/s²."""
+
     tilt: Annotated[values.Positive, values.OPTIONAL] = None
     """Tilt in every azimuth that the required box must allow, in degrees."""
 
@@ -160,6 +164,7 @@ class Optimise(options.JsonOptions, options.DesignOptions):
             held=self.held,
             error=self.error,
             deflection=self.deflection,
+            acceleration=self.acceleration,
             tilt=self.tilt,
             free=self.free,
             bounds=[_as_variable(word) for word in self.bounds],

@@ -24,10 +24,10 @@ from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.weights import bar_masses, machine_weights
+from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics import accuracy, budget as budgets, forces, loaded
 from explorer.statics.reactions import LIMITED
-from explorer.statics.weights import Weights
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
 B4: Triple = (0.0, 0.0, 0.0)
@@ -111,13 +111,13 @@ class Forces(LoadOptions):
             _force_lines(found, worst, added, nearest, tool),
         )
 
-    def _own_weights(self, design: Design) -> Weights:
+    def _own_weights(self, design: Design) -> MovingBodies:
         """Return the weights of legs and platform."""
         if self.density is None:
-            return Weights()
+            return MovingBodies()
         by_parts = self.parts and make_prototype(design).masses(self.density)
         masses = by_parts or bar_masses(design, self.density)
-        return machine_weights(design, masses, payload=False)
+        return moving_bodies(design, masses, payload=False)
 
 
 def _forces_json(

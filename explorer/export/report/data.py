@@ -13,7 +13,6 @@ from typing import TypeVar
 import numpy as np
 
 from explorer.errors import ExplorerError, NoAnswerError
-from explorer.export.simulation import DENSITY
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.measures.snapshot import Snapshot, evaluate
@@ -21,6 +20,8 @@ from explorer.mechanism.machine import Payload, Tool
 from explorer.numerics.arrays import triple
 from explorer.optimise.outcome import Record
 from explorer.prototype.assembly import Bill, bill_of_materials, make_prototype
+from explorer.prototype.dynamics import TimedPath
+from explorer.prototype.weights import DENSITY
 from explorer.statics.compliance import largest_deflection
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_workspace
@@ -46,9 +47,11 @@ class ReportData(Case):
 
     Attributes:
         record: Record of the search that found the design; None without one.
+        path: Path whose speeds and forces are told; None for none.
     """
 
     record: Record | None = None
+    path: TimedPath | None = None
 
     @property
     def is_home(self) -> bool:

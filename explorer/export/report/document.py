@@ -25,7 +25,7 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import encode_design
 from explorer.numerics.number_text import UNITS, format_number, power_of_ten
-from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Record, curves_of
+from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Curve, Record, curves_of
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
@@ -188,7 +188,9 @@ def _title(record: Record, curve: Curve) -> str:
         return "Worst demand; missed below 0"
     if curve.powers:
         return "F = |1 − V / V′|"
-    return f"{OBJECTIVE_SYMBOLS[record.problem.objective].capitalize()} (units)"
+    objective = record.problem.objective
+    unit = CATALOGUE[GOALS[objective]].unit_in(UNITS).name
+    return f"{OBJECTIVE_SYMBOLS[objective].capitalize()}{f' ({unit})' if unit else ''}"
 
 
 def _chart(curve: Curve, left: float, width: float) -> Iterator[Element]:
@@ -291,6 +293,7 @@ _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
     mechanism.singularity_section,
     mechanism.legs_section,
     workspace.loads_section,
+    workspace.path_section,
     workspace.precision_section,
     mechanism.parts_section,
     search_section,

@@ -10,7 +10,6 @@ from explorer.export.drawings import markup
 from explorer.export.drawings.markup import Cell, Row, element, number
 from explorer.export.drawings.mechanism import three_views
 from explorer.export.report.data import ReportData
-from explorer.export.simulation import DENSITY
 from explorer.legs.clearance import PAIRS
 from explorer.measures.blocks import singularity as blocks
 from explorer.measures.blocks.block import Facts, Statement
@@ -20,6 +19,7 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Triple, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.prototype.weights import DENSITY
 from explorer.singularity.colours import WARN_SHARE
 from explorer.singularity.ellipsoids import performance, singularity_free_ball
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, PairCost

@@ -1,4 +1,4 @@
-"""The sections on the workspace, on loads and on precision."""
+"""The sections on the workspace, on loads, on a path in time and on precision."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ import numpy as np
 
 from explorer.errors import ExplorerError
 from explorer.export.drawings import markup
+from explorer.export.drawings.drives import force_speed_chart, time_charts
 from explorer.export.drawings.markup import Cell, Piece, Row, element, number, paragraph, whole
 from explorer.export.drawings.slices import Slices, legend, slices_through
 from explorer.export.drawings.workspace_drawing import workspace_views
 from explorer.export.report.data import ReportData, compute
 from explorer.export.report.mechanism import angle_rows, point_rows
+from explorer.export.tables import corners_csv
 from explorer.measures.blocks import forces, precision as blocks
 from explorer.measures.blocks.block import Block
 from explorer.measures.catalogue import CATALOGUE
@@ -23,6 +25,8 @@ from explorer.mechanism.machine import Tool
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.paths.drives import drive_blocks
+from explorer.prototype.dynamics import drives_along
 from explorer.singularity.colours import WARN_SHARE
 from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.workspace.carried_region import CarriedRegion
@@ -172,6 +176,8 @@ def _payload(data: ReportData) -> Element:
     rows.append(("mass of the payload", _amount(payload.mass_kg, "kg"), ""))
     if payload.mass_kg:
         rows += point_rows(data, "the payload’s centre", payload.centre)
+    if any(payload.inertia_kg_mm2):
+        rows.append(("inertia about it, kg mm²", markup.vector(payload.inertia_kg_mm2), ""))
     rows.append(("force at the tool, any direction", _amount(payload.force_n, "N"), ""))
     rows.append(("gravity, along x, y, z of the base", markup.vector(data.design.gravity), ""))
     caption = "Tool and payload, from b4 in the platform’s axes"
@@ -181,10 +187,16 @@ def _payload(data: ReportData) -> Element:
 def _limits(data: ReportData) -> Element:
     actuators, struts, guide = data.design.actuators, data.design.struts, data.design.guide
     rows: list[Row] = [
-        (name, "no limit" if six is None else markup.range_of(six, " N", 4))
-        for name, six in (
-            ("push of an actuator, at most", actuators.push_n),
-            ("pull of an actuator, at most", actuators.pull_n or actuators.push_n),
+        (
+            f"{name} of an actuator, at most",
+            markup.range_of(six, f" {unit}", 4) if six else "no limit",
+        )
+        for name, unit, six in (
+            ("push", "N", actuators.push_n),
+            ("pull", "N", actuators.pull_n or actuators.push_n),
+            ("continuous force", "N", actuators.continuous_n),
+            ("speed", "mm/s", actuators.speed_mm_s),
+            ("acceleration", "mm/s²", actuators.acceleration_mm_s2),
         )
     ]
     if struts.outer_mm is not None:
@@ -278,6 +290,28 @@ def _share_slices(data: ReportData, solid: Solid) -> Element:
 def _amount(value: float | None, unit: str, without: str = "none") -> Cell:
     """Return an amount to four digits; words if it is zero, infinite or not given."""
     return (number(value, 4), f" {unit}") if value and math.isfinite(value) else without
+
+
+def path_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on what a path asks of the actuators; nothing without a path."""
+    if data.path is None:
+        return
+    design, path = data.design, data.path
+    found = compute(lambda: drives_along(design, path))
+    yield element("h2", "Drives")
+    if isinstance(found, ExplorerError):
+        yield paragraph(f"The path has no speeds and forces: {found}.", class_="note")
+        return
+    yield from markup.elements(drive_blocks(found))
+    charts = time_charts(found), force_speed_chart(found)
+    yield markup.illustration(
+        element("div", *charts, class_="pair"),
+        "Speeds, forces and powers of the actuators over time, and force against speed with the "
+        f"limits as dotted boxes. The bars of the legs and the platform have {path.density:g} "
+        "kg/m³; friction and the rotors of motors are left out.",
+    )
+    yield paragraph("Corners of the path, a table for the option --path of explorer drives:")
+    yield element("pre", corners_csv(path.poses, path.tool))
 
 
 def precision_section(data: ReportData) -> Iterator[Element]:

@@ -83,9 +83,9 @@ def load_source(topic: LoadTopic, loaded: LoadedPose, density: float | None = No
         options += " --payload 0"
         arguments.append("weighs_payload=False")
     if density is not None:
-        imports.append("from explorer.prototype.weights import machine_weights")
+        imports.append("from explorer.prototype.weights import moving_bodies")
         masses = f"explorer.make_prototype(design).masses({density:g})"
-        lines.append(f"own = machine_weights(design, {masses}, payload=False)")
+        lines.append(f"own = moving_bodies(design, {masses}, payload=False)")
         arguments.append("own=own")
         if topic == "forces":
             options += f" --density {density:g} --parts"

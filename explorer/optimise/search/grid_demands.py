@@ -257,19 +257,47 @@ class LoadDemand(Demand):
         box, counts = state.statics, self.side.keeps(state, state.statics.positions)
         if not counts.any():
             return _miss_beyond_plane(state, self.side, len(self.names))
-        shares, parts = box.node_utilisations[:, : len(PARTS)].copy(), np.flatnonzero(self.counts)
+        shares = box.node_utilisations[:, : len(PARTS)].copy()
         # The guide takes the bending of the struts as a moment, which may be closer to its limit.
         shares[:, slopes.BENDING] = np.maximum(
             shares[:, slopes.BENDING], box.node_utilisations[:, len(PARTS) :]
         )
-        worst = _worst_nodes(box, shares[:, parts], counts).T.ravel()
-        part = np.repeat(parts, EIGHTHS)
-        nodes, row = np.unique(worst, return_inverse=True)
-        twists = slopes.twist_slopes(state.design, box.positions[nodes], state.rotation)
-        share, by = slopes.share_slopes(
-            state.design, state.rotation, twists, (row, part), self.limits
-        )
+        positions, parts = self._worst_parts(box, shares, counts)
+        twists = slopes.twist_slopes(state.design, positions, state.rotation)
+        share, by = slopes.share_slopes(state.design, state.rotation, twists, parts, self.limits)
         return _spare(share, by @ state.rows(CHAIN))
+
+    def _worst_parts(
+        self, box: BoxStatics, values: FloatArray, counts: BoolArray
+    ) -> tuple[FloatArray, tuple[IntArray, IntArray]]:
+        """Return positions, and as in `share_slopes` each part where its value is the largest.
+
+        It is the largest in each eighth of the box; the values have the shape (n, 10).
+        """
+        parts = np.flatnonzero(self.counts)
+        worst = _worst_nodes(box, values[:, parts], counts).T.ravel()
+        nodes, row = np.unique(worst, return_inverse=True)
+        return box.positions[nodes], (row, np.repeat(parts, EIGHTHS))
+
+
+class AccelerationDemand(LoadDemand):
+    """The largest acceleration from rest that each part allows, over the required box, in m/s²."""
+
+    def __init__(self, start: State, least: float) -> None:
+        super().__init__(start, 1.0)
+        self.least = least
+        self.names = tuple(name.replace("load of", "acceleration by", 1) for name in self.names)
+
+    def measure(self, state: State) -> Measured:
+        """Return the accelerations over the least one, less 1, bounded above by 1."""
+        box, counts = state.statics, self.side.keeps(state, state.statics.positions)
+        if not counts.any():
+            return _miss_beyond_plane(state, self.side, len(self.names))
+        positions, parts = self._worst_parts(box, -box.accelerations, counts)
+        value, by = slopes.acceleration_slopes(state.design, positions, state.rotation, parts)
+        value, by = value / self.least, by @ state.rows(CHAIN) / self.least
+        above = np.maximum(1.0, value)
+        return Measured(np.minimum(1.0, value) - 1.0 / above, by / (above**2)[:, None])
 
 
 class DisplacementDemand(Demand):

@@ -228,6 +228,8 @@ def _demands(problem: Problem, start: State) -> list[demands.Demand]:
         machine.append(grid_demands.DisplacementDemand(start, "error", wanted.error))
     if wanted.deflection is not None:
         machine.append(grid_demands.DisplacementDemand(start, "deflection", wanted.deflection))
+    if wanted.acceleration is not None:
+        machine.append(grid_demands.AccelerationDemand(start, wanted.acceleration))
     listed += machine
     if machine or problem.objective in OF_THE_MACHINE:
         listed.append(demands.MarginDemand(start, is_open=True))

@@ -21,7 +21,7 @@ from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_number
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import has_limits
-from explorer.statics.weights import Weights
+from explorer.statics.weights import MovingBodies
 from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
 if TYPE_CHECKING:
@@ -93,17 +93,17 @@ def is_bare(loaded: LoadedPose) -> bool:
     return not (needed.actuators.any() or needed.spread.any())
 
 
-def weights_of_parts(request: tuple[Design, float]) -> Weights:
+def weights_of_parts(request: tuple[Design, float]) -> MovingBodies:
     """Return the weights of a prototype's parts, without the payload, at a density in kg/m³.
 
     Raises:
         ExplorerError: The design has no prototype.
     """
     from explorer.prototype.assembly import make_prototype
-    from explorer.prototype.weights import machine_weights
+    from explorer.prototype.weights import moving_bodies
 
     design, density = request
-    return machine_weights(design, make_prototype(design).masses(density), payload=False)
+    return moving_bodies(design, make_prototype(design).masses(density), payload=False)
 
 
 def _weights_request(frame: Frame) -> tuple[Design, float] | None:
@@ -121,7 +121,7 @@ class Loads:
 
     def __init__(self, services: Services) -> None:
         self.weights = services.get(WEIGHTS_FEED)
-        self._last: tuple[State, Weights | None, ToolPrecision] | None = None
+        self._last: tuple[State, MovingBodies | None, ToolPrecision] | None = None
 
     def of(self, frame: Frame) -> LoadedPose:
         """Return the pose of a frame under its load and the weights that count."""

@@ -1,9 +1,9 @@
-"""The controls of the six actuators: forces, positioning errors and stiffness."""
+"""The controls of the six actuators: forces, speeds, positioning errors and stiffness."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import msgspec
 import viser
@@ -13,7 +13,7 @@ from explorer.app.state.actions import Action, Set
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.design_file import STIFFNESSES
+from explorer.mechanism.design_file import STIFFNESS
 from explorer.mechanism.machine import Six
 from explorer.numerics.number_text import format_number
 
@@ -101,13 +101,15 @@ class Quantity(NamedTuple):
         unit: Its unit.
         meaning: Beginning of the sentence on it.
         step: Step of its fields.
+        start: Number to begin with; None for those of the push.
     """
 
-    name: Literal["push_n", "pull_n", "error_mm", "stiffness_n_mm"]
+    name: str
     word: str
     unit: str
     meaning: str
     step: float
+    start: float | None = None
 
     @property
     def path(self) -> str:
@@ -120,16 +122,31 @@ class Quantity(NamedTuple):
 
     def first(self, state: State) -> Six:
         """Return the six numbers; where there are none, those to begin with."""
-        given = self.given(state)
-        if given is not None:
-            return given
-        return STIFFNESSES if self is STIFF else PUSH.given(state) or FORCES
+        six = None if self.start is None else cast("Six", (self.start,) * 6)
+        return self.given(state) or six or PUSH.given(state) or FORCES
 
 
 PUSH = Quantity("push_n", "push", "N", "Largest force that increases a joint's value", MEDIUM)
 PULL = Quantity("pull_n", "pull", "N", "Largest force that decreases it", MEDIUM)
+CONTINUOUS = Quantity(
+    "continuous_n", "continuous force", "N", "Largest root-mean-square force of a motion", MEDIUM
+)
+SPEED = Quantity("speed_mm_s", "speed", "mm/s", "Largest speed to either side", 1.0, 200.0)
+ACCELERATION = Quantity(
+    "acceleration_mm_s2", "acceleration", "mm/s²", "Largest acceleration either way", 10.0, 2000.0
+)
 ERROR = Quantity("error_mm", "error", "mm", "Largest positioning error to either side", FINE)
-STIFF = Quantity("stiffness_n_mm", "stiffness", "N/mm", "Force along the joint per deflection", 1.0)
+STIFF = Quantity(
+    "stiffness_n_mm", "stiffness", "N/mm", "Force along the joint per deflection", 1.0, STIFFNESS
+)
+
+# Those that are None while a switch is off, with its words.
+SWITCHED = (
+    (CONTINUOUS, "Limited continuous force", "Limit what the actuators bear without end."),
+    (SPEED, "Limited speed", "Limit the speeds of the actuators."),
+    (ACCELERATION, "Limited acceleration", "Limit the accelerations of the actuators."),
+    (STIFF, "Elastic", "Give the actuators a stiffness; off, they are rigid."),
+)
 
 
 def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
@@ -148,22 +165,18 @@ def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
         is_possible=_is_limited,
     )
     _add_common(controls, PULL)
+    for quantity, label, hint in SWITCHED:
+        controls.switch(label, hint, quantity.path, quantity.first)
+        _add_common(controls, quantity)
     _add_common(controls, ERROR)
-    controls.switch(
-        "Elastic",
-        "Give the actuators a stiffness; off, they are rigid.",
-        STIFF.path,
-        STIFF.first,
-    )
-    _add_common(controls, STIFF)
     with gui.add_folder("Each of the six", expand_by_default=False):
-        for quantity in (PUSH, PULL, ERROR, STIFF):
+        for quantity in (PUSH, PULL, CONTINUOUS, SPEED, ACCELERATION, ERROR, STIFF):
             for index, joint in enumerate(JOINTS):
                 _add_one(controls, quantity, index, joint)
 
 
 def _add_common(controls: MachineControls, quantity: Quantity) -> None:
-    label = f"{quantity.word.capitalize()} of each ({quantity.unit})"
+    label = f"{quantity.word.capitalize()} ({quantity.unit})"
     # The number that counts for all six.
     extreme, word = (max, "largest") if quantity is ERROR else (min, "least")
     controls.field(

@@ -96,6 +96,13 @@ class MachinePanel:
             )
             self._weight = gui.add_html("", visible=False)
             self._add_point("centre", "the payload's centre", "design.payload.centre")
+            controls.triple(
+                "Inertia (kg mm²)",
+                "Moments of inertia about the payload's centre along the platform's axes; they "
+                "count in motions only.",
+                "design.payload.inertia_kg_mm2",
+                step=FINE,
+            )
             controls.field(
                 "Force on the tool (N)",
                 "Largest force of the process, which acts at the tool point in any direction.",
@@ -234,7 +241,9 @@ class MachinePanel:
 def _with_units(words: str) -> str:
     """Return words as HTML in which no line ends between a number and its unit."""
     return re.sub(
-        r"(?<=\d) (kg|N m|N)\b", lambda unit: unit[0].replace(" ", "&nbsp;"), escape(words)
+        r"(?<=\d) (kg|N m|N|mm/s²|mm/s)(?!\w)",
+        lambda unit: unit[0].replace(" ", "&nbsp;"),
+        escape(words),
     )
 
 
@@ -271,7 +280,8 @@ def machine_words(design: Design, unit: Unit) -> str:
     free = [f"the {name}" for name, words in limits.items() if not words]
     has = "has" if free == ["the guide"] else "have"
     no_limit = f"{' and '.join(free)} {has} no limit" if free else ""
-    parts += [*limits.values(), "no force is limited" if len(free) == 3 else no_limit]
+    parts += [*limits.values(), _motion_words(design.actuators)]
+    parts.append("no force is limited" if len(free) == 3 else no_limit)
     line = "; ".join(filter(None, parts))
     return f"{line[:1].upper()}{line[1:]}."
 
@@ -305,6 +315,17 @@ def _actuator_words(actuators: Actuators) -> str:
     sides = {"push": push, "pull": pull}
     words = [f"{side} up to {_range(most)} N" for side, most in sides.items() if most[0] < math.inf]
     return f"actuators {' and '.join(words)}"
+
+
+def _motion_words(actuators: Actuators) -> str:
+    limits = (
+        (actuators.continuous_n, "continuous forces", "N"),
+        (actuators.speed_mm_s, "speeds", "mm/s"),
+        (actuators.acceleration_mm_s2, "accelerations", "mm/s²"),
+    )
+    return "; ".join(
+        f"{name} up to {_range(np.array(six))} {unit}" for six, name, unit in limits if six
+    )
 
 
 def _text(value: float) -> str:

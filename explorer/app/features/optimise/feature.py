@@ -152,6 +152,14 @@ class OptimisePanel:
             visible=lambda state: is_elastic(state.design) or _request(state).deflection > 0,
         )
         self._add_number(
+            "acceleration",
+            "acceleration",
+            "The acceleration from rest, in every direction, that the limits of forces and moments "
+            "must allow with the payload in the required box, in m/s²; 0 for no demand.",
+            step=0.1,
+            visible=lambda s: max(s.design.payload.mass_kg, _request(s).acceleration) > 0.0,
+        )
+        self._add_number(
             "tilt",
             "box_tilt",
             "The tilt from the orientation of home that every position of the required box must "

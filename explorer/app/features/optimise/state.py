@@ -6,8 +6,9 @@ exactly. The user fills in an `OptimisationRequest`; a `Problem` is made of it w
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -38,7 +39,7 @@ class OptimisationRequest:
         starts: Number of designs to start from.
         with_box: Whether a box must lie within the workspace, whatever the objective.
         box: The required box; None for one that suits the design.
-        clearance, held, error, deflection, tilt: As in `Demands`; 0 for no demand.
+        clearance, held, error, deflection, acceleration, tilt: As in `Demands`; 0 for no demand.
 
     Raises:
         InputError: A volume or reach that is not positive, a clearance below zero, too few or too
@@ -56,6 +57,7 @@ class OptimisationRequest:
     held: bool = False
     error: float = 0.0
     deflection: float = 0.0
+    acceleration: float = 0.0
     tilt: float = 0.0
 
     def __post_init__(self) -> None:
@@ -63,14 +65,13 @@ class OptimisationRequest:
         if unknown:
             raise InputError(f"nothing named {min(unknown)!r} can be free in an optimisation")
         check_starts(self.starts)
-        problems.Demands(
-            volume=self.volume,
-            reach=self.reach,
-            clearance=self.clearance or None,
-            error=self.error or None,
-            deflection=self.deflection or None,
-            tilt=self.tilt or None,
-        )
+        problems.Demands(volume=self.volume, reach=self.reach, **self.demanded)
+
+    @property
+    def demanded(self) -> Mapping[str, Any]:
+        """The demands that are numbers but 0 for none, by name; None for none."""
+        names = "clearance", "error", "deflection", "acceleration", "tilt"
+        return {name: getattr(self, name) or None for name in names}
 
     @property
     def needs_volume(self) -> bool:
@@ -85,8 +86,8 @@ class OptimisationRequest:
     @property
     def needs_box(self) -> bool:
         """Whether a box is required."""
-        demands = self.held or max(self.error, self.deflection, self.tilt) > 0.0
-        return self.with_box or demands or self.objective in problems.OVER_BOX
+        demands = self.held, self.error, self.deflection, self.acceleration, self.tilt
+        return self.with_box or any(demands) or self.objective in problems.OVER_BOX
 
 
 @dataclass(frozen=True)

@@ -71,12 +71,9 @@ def _problem(design: Design, request: OptimisationRequest) -> problems.Problem:
         request.objective,
         volume=request.volume if request.needs_volume else None,
         reach=request.reach if request.needs_reach else None,
-        clearance=request.clearance or None,
         required_box=request.box if request.needs_box else None,
         held=request.held,
-        error=request.error or None,
-        deflection=request.deflection or None,
-        tilt=request.tilt or None,
+        **request.demanded,
         free=free,
     )
     variables = tuple(variable for variable in problem.variables if variable.name in free)

@@ -11,6 +11,7 @@ import viser
 from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab, show
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
+from explorer.app.features.paths.work import DRIVES_FEED, draw_drives
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
 from explorer.app.session.worker import Worker
@@ -168,6 +169,7 @@ PATHS = Feature(
     tabs=(Tab("work", "Paths", PathsPanel, viser.Icon.ROUTE),),
     bar=(InBar("right", lambda _: path_chip),),
     scene=(PathScene,),
+    later_feeds=(DRIVES_FEED,),
     runners=(PathRunner,),
     commands=(
         StateCommand(
@@ -178,5 +180,6 @@ PATHS = Feature(
             (Key("P"),),
         ),
     ),
+    tasks=(draw_drives,),
     keys={"Paths › Go": (Key("J"),)},
 )

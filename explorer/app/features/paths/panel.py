@@ -10,6 +10,7 @@ import viser
 
 from explorer.app.features.feature import Services, show_html
 from explorer.app.features.paths import actions, plots
+from explorer.app.features.paths.drives import DrivesPanel
 from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.state.actions import Action, Set
@@ -126,6 +127,8 @@ class PathsPanel:
                 plots.IncidencePlot(gui, lambda _: plots.FOLDS),
             )
             self._loads = plots.LoadPlot(services)
+        with gui.add_folder("Drives"):
+            self._drives = DrivesPanel(services, self._controls)
         services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
         services.do_on_press("paths.cancel", lambda _: CANCEL)
         self._clear = services.link(
@@ -164,8 +167,8 @@ class PathsPanel:
         title = plan_words(state) or path_title(state, self._loads.shares(frame), self._clear)
         yield self._title, "content", title
         yield from show_html(self._demand, plots.demand_note(state))
-        for plot in (*self._incidences, self._loads):
-            yield from plot.updates(frame)
+        for part in (*self._incidences, self._loads, self._drives):
+            yield from part.updates(frame)
         yield from self._controls.updates(frame)
 
     def _add_end(self, gui: viser.GuiApi, end: EndName) -> viser.GuiHtmlHandle:

@@ -13,6 +13,7 @@ import viser
 from explorer.app.browser.downloads import File
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
 from explorer.app.features.optimise.state import Optimisation
+from explorer.app.features.paths.work import request_for
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.features.sharing import scene_files
 from explorer.app.features.sharing.reporting import ReportFormat, make_report
@@ -109,11 +110,13 @@ def send_scene(services: Services, who: Who) -> None:
 def send_report(services: Services, file_format: ReportFormat, who: Who) -> None:
     """Send the report of the design in its present pose."""
     state = services.session.latest_state()
+    asked = request_for(state)
+    path = asked and asked[1]
     services.downloads.compute(
         who,
         f"{state.design.name}-report.{file_format}",
         make_report,
-        (state.design, state.pose, Optimisation.of(state).record, file_format),
+        (state.design, state.pose, Optimisation.of(state).record, file_format, path),
         ("Writing the report", "This takes some seconds."),
     )
 

@@ -12,6 +12,7 @@ from typing import Literal
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 from explorer.optimise.outcome import Record
+from explorer.prototype.dynamics import TimedPath
 
 ReportFormat = Literal["html", "pdf"]
 
@@ -21,6 +22,7 @@ def make_report(
     pose: Pose | None = None,
     record: Record | None = None,
     file_format: ReportFormat = "html",
+    path: TimedPath | None = None,
     *,
     date: dt.date | None = None,
 ) -> bytes:
@@ -31,6 +33,7 @@ def make_report(
         pose: Pose of its platform, whose orientation the workspace has; home if None.
         record: Record of the search that gave the design, which adds its history.
         file_format: HTML, or PDF by a headless browser.
+        path: Path whose speeds and forces are told.
         date: Date of the report; today if None.
 
     Raises:
@@ -40,7 +43,9 @@ def make_report(
     from explorer.export.report.data import ReportData
     from explorer.export.report.document import report_html
 
-    html = report_html(ReportData(design, pose=pose, record=record), date or dt.date.today())
+    html = report_html(
+        ReportData(design, pose=pose, record=record, path=path), date or dt.date.today()
+    )
     if file_format == "html":
         return html.encode()
     # Playwright refuses calls on a thread with an event loop, such as a notebook's.

@@ -1,0 +1,50 @@
+"""What the path of the page asks of the actuators, computed and drawn in the worker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from explorer.app.session.feed import feed_of
+from explorer.app.state.state import State
+from explorer.errors import ExplorerError
+from explorer.export.drawings.drives import force_speed_chart, time_charts
+from explorer.export.drawings.markup import as_html
+from explorer.measures.blocks.block import Block
+from explorer.mechanism.design import Design
+from explorer.paths.drives import drive_blocks
+from explorer.prototype.dynamics import TimedPath, drives_along
+
+DrivesRequest: TypeAlias = tuple[Design, TimedPath]
+"""A path of a design."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrivesDrawing:
+    """What a path asks of the actuators, and its charts as SVG."""
+
+    blocks: tuple[Block, ...]
+    charts: str
+
+
+def request_for(state: State) -> DrivesRequest | None:
+    """Return the path of a state if speeds and forces along it are wanted, else None."""
+    journey, paths = state.journey, state.paths
+    if journey is None or paths.drives == "off":
+        return None
+    duration = paths.duration if paths.drives == "duration" else None
+    density = state.view.prototype.density
+    return journey.design, TimedPath(journey.poses, duration, journey.tool, density)
+
+
+def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:
+    """Return what a path asks of the actuators with its charts, or why there is no answer."""
+    try:
+        found = drives_along(*request)
+    except ExplorerError as error:
+        return error
+    charts = "".join(as_html(chart) for chart in (time_charts(found), force_speed_chart(found)))
+    return DrivesDrawing(tuple(drive_blocks(found)), charts)
+
+
+DRIVES_FEED = feed_of(draw_drives, lambda frame: request_for(frame.state))

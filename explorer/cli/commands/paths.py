@@ -1,0 +1,275 @@
+"""`explorer path` and `drives`: planned paths, and what a path asks of the actuators in time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path as File
+from typing import Annotated
+
+import numpy as np
+import tyro
+
+from explorer.cli import options, output, values
+from explorer.errors import InputError
+from explorer.export.pose_tables import MOST_BYTES, parse_table, read_poses
+from explorer.export.tables import corners_csv, drives_csv, trajectory_csv
+from explorer.files.writing import check_writable, read_at_most
+from explorer.legs.moves import StraightMoves
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose
+from explorer.paths import planning
+from explorer.paths.crossings import path_margins
+from explorer.paths.drives import Drives as DrivesOfPath, drive_blocks
+from explorer.paths.loads import PathLoads, path_loads
+from explorer.paths.time_law import TimeLaw, law_at_speed
+from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
+from explorer.prototype.dynamics import TimedPath, drives_along
+from explorer.prototype.weights import DENSITY
+from explorer.statics.reactions import LIMITED, PART_NAMES
+
+INSTEAD = values.hint("instead of --from-quaternion")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimedOptions(options.JsonOptions, options.EndOptions, options.PointOptions):
+    """The options for the design, the two ends of a path, and its time."""
+
+    from_: Annotated[
+        values.PoseNumbers,
+        tyro.conf.arg(name="from", help_behavior_hint="(default: the home pose)"),
+    ] = None
+    """Start of the path; lengths are in design units."""
+
+    from_quaternion: Annotated[values.Quaternion, values.OF_HOME] = None
+    """Orientation of the platform at the start."""
+
+    from_yaw_pitch_roll: Annotated[values.YawPitchRoll, INSTEAD] = None
+    """Orientation of the platform at the start, in degrees."""
+
+    from_tilt_torsion: Annotated[values.TiltTorsion, INSTEAD] = None
+    """Azimuth, tilt and torsion of the platform at the start, in degrees."""
+
+    from_folds: Annotated[values.Folds, values.hint("instead of --from")] = None
+    """Folds of the pose at the start; r in design units, angles in degrees."""
+
+    to: Annotated[values.PoseNumbers, values.OPTIONAL] = None
+    """End of the path; lengths are in design units."""
+
+    speed: Annotated[values.Positive, values.hint("default: a tenth of the reach")] = None
+    """Speed of the fastest actuator, in design units per second."""
+
+    acceleration: Annotated[values.Positive, values.hint("default: at the speed at once")] = None
+    """Acceleration with which the fastest actuator reaches this speed, and stops at every corner,
+    in design units per s²."""
+
+    samples: Annotated[int, values.whole_number(2, 100_000)] = 201
+    """Number of rows of the table."""
+
+    def ends(self, design: Design) -> tuple[Pose, Pose | None]:
+        """Return the poses at start and end; the end is None if it is not given."""
+        tool = self.tool(design)
+        start = options.make_pose(self, "from_", design.home_pose, self.from_, tool)
+        return start, self.end(start, self.to, tool)
+
+    def law(self, design: Design, poses: Sequence[Pose]) -> TimeLaw | None:
+        """Return the time law of the path with these corners; None without an acceleration."""
+        if self.acceleration is None:
+            return None
+        moves, speed = StraightMoves.along(poses, self.tool(design)), self.speed
+        return law_at_speed(design, moves, speed or DEFAULT_SPEED * design.reach, self.acceleration)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Path(options.RadiiOptions, TimedOptions):
+    """Plan a path between two poses within limits, margins and clearances.
+
+    Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
+    pitch roll in degrees, or a position and a quaternion w x y z. With `--at tool` positions are
+    those of the tool, which then goes straight in each move. Needs the extra `planning`.
+    """
+
+    load: Annotated[values.Load, values.OPTIONAL] = None
+    """Force in N and moment in N × unit at the tool, along the axes of the base, besides the
+    payload: the path holds them within the limits of actuators, struts and guide."""
+
+    seconds: Annotated[float, values.POSITIVE] = 2.0
+    """Longest time to search for a path, in seconds."""
+
+    out: Annotated[File | None, values.hint("optional", "FILE.csv")] = None
+    """File for the trajectory as CSV: time, joints and pose, and the tool's position with `--at
+    tool`."""
+
+    corners: Annotated[File | None, values.hint("optional", "FILE.csv")] = None
+    """File for the corners of the path as CSV, for `explorer drives --path`."""
+
+    def run(self) -> None:
+        """Write the path."""
+        design = self.with_radii(self.read_design())
+        tool = self.tool(design)
+        start, goal = self.ends(design)
+        if goal is None:
+            raise InputError(f"say where the path ends {options.END_OPTIONS}")
+        if self.load is not None:
+            options.check_has_limits(design)
+        for file in filter(None, (self.out, self.corners)):
+            check_writable(file)
+        try:
+            path = planning.plan_path(
+                design, start, goal, seconds=self.seconds, tool=tool, load=self.load
+            )
+        except planning.NoPathError as error:
+            if self.json:
+                output.write_json({"found": False, "reason": error.reason, "poses": []})
+            raise
+        law = self.law(design, path.poses)
+        timed = trajectory(
+            design, path.poses, speed=self.speed, samples=self.samples, tool=tool, law=law
+        )
+        loads = None
+        if self.load is not None:
+            loads = path_loads(design, path.poses, self.load, tool=tool)
+        texts = {self.corners: corners_csv(path.poses, tool), self.out: trajectory_csv(timed)}
+        files = {file: text.encode() for file, text in texts.items() if file is not None}
+        written, errors = options.write_files(files)
+        out = self.out if self.out in written else None
+        self.write(
+            lambda: _path_json(path, timed, loads, out),
+            _path_lines(design, path, timed, loads, out),
+            errors,
+        )
+
+
+def _path_json(
+    path: planning.PlannedPath, timed: Trajectory, loads: PathLoads | None, out: File | None
+) -> dict[str, object]:
+    names = "time joints position quaternion" + (" tool_position" if path.tool else "")
+    largest = loads and {
+        "largest_share": loads.share,
+        "largest_share_bound": loads.bound,
+        "largest_share_part": None if loads.part is None else LIMITED[loads.part],
+        "largest_share_at": loads.place,
+    }
+    return {
+        "found": True,
+        "reason": None,
+        "poses": [output.pose_json(pose, path.tool) for pose in path.poses],
+        **output.attributes(path, "length margin clearance seconds checked"),
+        "duration": timed.duration,
+        "trajectory": output.attributes(timed, names),
+        **(largest or {}),
+        **({} if out is None else {"file": out}),
+    }
+
+
+def _path_lines(
+    design: Design,
+    path: planning.PlannedPath,
+    timed: Trajectory,
+    loads: PathLoads | None,
+    out: File | None,
+) -> Iterator[str]:
+    least = path_margins(path.poses, tool=path.tool).least
+    plural = "" if path.checked == 1 else "s"
+    yield output.heading(design)
+    yield from output.end_lines(design, path.poses[0], path.poses[-1], path.tool)
+    rows = [
+        ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
+        ("length", f"{output.figure(path.length)} (root mean square of b1 to b4)"),
+        (
+            "keeps",
+            f"|δ| {output.figure(path.margin)}, clearance {output.figure(path.clearance)} or more",
+        ),
+        ("planned in", f"{path.seconds:.3g} s, {path.checked} line{plural} tried"),
+        ("takes", f"{output.figure(timed.duration)} s"),
+        ("least |δ|", "  ".join(f"δ{i + 1} {output.figure(v)}" for i, v in enumerate(least))),
+    ]
+    if loads is not None:
+        words = f"held, with {100.0 * loads.share:.1f} % of a limit"
+        words += f" at {len(loads.at)} samples and {100.0 * loads.bound:.1f} % at most between them"
+        if loads.part is not None:
+            seconds = float(np.interp(loads.place, timed.at, timed.time))
+            words += f": {PART_NAMES[loads.part]}, at {output.figure(seconds)} s"
+        rows.append(("load", words))
+    yield from ("", output.table(rows, "<<"))
+    if out is not None:
+        yield from ("", f"{len(timed.time)} rows in {out}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drives(TimedOptions):
+    """Compute speeds, forces and powers of the actuators along a path; the least motor.
+
+    A path rests at every corner. It takes the shortest time within the design's limits of speeds,
+    accelerations and forces, which needs the extra `timing`; or `--duration`; or it has `--speed`
+    and `--acceleration`. Forces hold and accelerate platform, payload and legs; friction and the
+    rotors of motors are left out.
+    """
+
+    path: Annotated[File | None, values.hint("instead of --from and --to", "FILE")] = None
+    """Corners of the path: a table of poses as that of `explorer inverse --poses`, such as
+    `explorer path --corners` writes."""
+
+    duration: Annotated[values.Positive, values.hint("default: the shortest")] = None
+    """Duration in seconds, with the least acceleration of the fastest actuator."""
+
+    payload: Annotated[values.NotNegative, values.OF_DESIGN] = None
+    """Mass of the payload, in kg."""
+
+    density: Annotated[float, values.POSITIVE] = DENSITY
+    """Density of the legs and the platform in kg/m³, as bars with the legs' radii."""
+
+    out: Annotated[File | None, values.hint("optional", "FILE.csv")] = None
+    """File for a table: time in s, then joints and pose in mm, speeds in mm/s, forces in N and
+    powers in W."""
+
+    def run(self) -> None:
+        """Write what the path asks of the actuators."""
+        design = self.read_design()
+        payload = options.replace_given(design.payload, mass_kg=self.payload)
+        design = options.replace_given(design, payload=payload)
+        if self.out is not None:
+            check_writable(self.out)
+        poses, tool = self._poses(design), self.tool(design)
+        law = self.law(design, poses)
+        if self.speed is not None and law is None:
+            raise InputError("--speed needs --acceleration: a path starts and ends at rest")
+        if self.duration is not None and law is not None:
+            raise InputError("give either --duration, or --speed and --acceleration")
+        found = drives_along(design, TimedPath(poses, law or self.duration, tool, self.density))
+        timed = trajectory(design, poses, law=found.law, samples=self.samples, tool=tool)
+        files = {} if self.out is None else {self.out: drives_csv(found, timed).encode()}
+        written, errors = options.write_files(files)
+        lines = [output.heading(design), *output.block_lines(drive_blocks(found))]
+        lines += [line for file in written for line in ("", f"{self.samples} rows in {file}")]
+        self.write(lambda: _drives_json(found, written), lines, errors)
+
+    def _poses(self, design: Design) -> tuple[Pose, ...]:
+        """Return the corners of the path."""
+        start, goal = self.ends(design)
+        if self.path is None:
+            if goal is None:
+                raise InputError(
+                    f"give the path with --path, or say where it ends {options.END_OPTIONS}"
+                )
+            return start, goal
+        if goal is not None or start != design.home_pose:
+            raise InputError("--path has the ends of the path; leave --from and --to out")
+        table = parse_table(str(self.path), read_at_most(self.path, MOST_BYTES), design.unit_mm)
+        if "time" in table.columns:
+            raise InputError(
+                f"{self.path} has a column time, so it is a path in time already: give the "
+                "corners alone, such as those of explorer path --corners"
+            )
+        c = read_poses(table, design, start.rotation, self.at)
+        return tuple(Pose.of(*each) for each in zip(c.positions, c.rotations, strict=True))
+
+
+def _drives_json(found: DrivesOfPath, written: Sequence[File]) -> dict[str, object]:
+    return {
+        **found.figures._asdict(),
+        "duration": found.law.duration,
+        "binding": [each and each._asdict() for each in found.binding],
+        "least_motor": found.least_motor,
+        **({"file": written[0]} if written else {}),
+    }

@@ -1,0 +1,131 @@
+"""Charts of what a path asks of the actuators: over time, and force against speed, as SVG."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from explorer.export.drawings.markup import coordinate, drawing_text, element, path_of
+from explorer.export.drawings.slices import ruler
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.machine import or_infinite
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
+from explorer.paths.drives import PLACES, Drives
+from explorer.singularity.colours import Rgb, css
+
+# The width of the charts, the height of one over time and of that of forces and speeds, and the
+# room around each.
+WIDTH, HEIGHT, TALL = 340.0, 84.0, 240.0
+LEFT, RIGHT, ABOVE, BELOW, LEGEND = 46.0, 12.0, 24.0, 38.0, 16.0
+# A colour for each leg; the actuator along the guide is dashed.
+_LEGS: tuple[Rgb, ...] = ((46, 116, 208), (202, 112, 12), (22, 146, 118), (186, 64, 128))
+_LOOKS = [(_LEGS[leg], "5 3" if d in (1, 3) else None) for d, leg in enumerate((0, 1, 1, 2, 2, 3))]
+# Room beyond the values of an axis, as a share of their span.
+ROOM = 0.06
+
+
+def time_charts(drives: Drives) -> Element:
+    """Return speeds, forces and powers of the actuators over time, one below the other."""
+    pieces, top = [*_legend()], LEGEND
+    charts = (
+        ("speed (mm/s)", "", drives.speed),
+        ("force (N)", "", drives.force),
+        ("power (W)", "time (s)", drives.power),
+    )
+    for title, name, values in charts:
+        rows = _drawn(values)
+        curves = [np.stack([_drawn(drives.time), row], axis=-1) for row in rows.T]
+        chart = _Chart((0.0, drives.law.duration), _ends([*rows.ravel(), 0.0]), top, HEIGHT)
+        pieces += chart.draw(title, name, curves)
+        top += ABOVE + HEIGHT
+    return _svg(top + BELOW, "Speeds, forces and powers of the actuators over time", pieces)
+
+
+def force_speed_chart(drives: Drives) -> Element:
+    """Return the forces of the actuators against their speeds, with the limits as a box."""
+    push, pull = drives.design.actuators.limits
+    speed = or_infinite(drives.design.actuators.speed_mm_s)
+    # Lowest and highest values of both axes, shape (2, 2, 6).
+    limits = np.array([[-speed, speed], [-pull, push]])
+    both = np.stack([_drawn(drives.speed), _drawn(drives.force)])
+    ends = [_ends([*both[i].ravel(), *limits[i].ravel()]) for i in (0, 1)]
+    chart = _Chart(ends[0], ends[1], LEGEND, TALL)
+    curves = [both[..., joint].T for joint in range(6)]
+    pieces = [*_legend(), *chart.draw("force (N)", "speed (mm/s)", curves)]
+    # A side without a limit lies at the end of its axis.
+    sides = np.clip(limits, *np.transpose(ends)[..., None, None])
+    boxes = np.unique(sides.reshape(4, 6), axis=1).T if np.isfinite(limits).any() else ()
+    for x0, x1, y0, y1 in boxes:
+        path = path_of(chart.place(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])))
+        pieces.append(element("path", d=path, class_="limit"))
+    words = "Forces of the actuators against their speeds"
+    return _svg(LEGEND + ABOVE + TALL + BELOW, words, pieces)
+
+
+def _svg(height: float, title: str, pieces: Iterable[Element]) -> Element:
+    view = f"0 0 {coordinate(WIDTH)} {coordinate(height)}"
+    look = {"class_": "drives", "viewBox": view, "role": "img"}
+    return element(
+        "svg", element("title", title), *pieces, xmlns="http://www.w3.org/2000/svg", **look
+    )
+
+
+def _drawn(values: FloatArray) -> FloatArray:
+    """Return those of values (n, ...) that are drawn: the first of each interval, and the last."""
+    return np.concatenate([values[:: len(PLACES)], values[-1:]])
+
+
+def _ends(values: Iterable[float]) -> tuple[float, float]:
+    """Return the ends of an axis of some values, leaving out those that are not finite."""
+    finite = [float(value) for value in values if np.isfinite(value)]
+    low, high = min(finite), max(finite)
+    room = ROOM * (high - low) or 1.0
+    return low - room, high + room
+
+
+def _legend() -> Iterator[Element]:
+    for index, (name, (colour, dash)) in enumerate(zip(JOINTS, _LOOKS, strict=True)):
+        x = LEFT + 48.0 * index
+        look = {"stroke": css(colour), "stroke_dasharray": dash, "class_": "drive"}
+        yield element("line", x1=x, y1=8.0, x2=x + 20.0, y2=8.0, **look)
+        yield drawing_text(name, x + 24.0, 12.0)
+
+
+class _Chart(NamedTuple):
+    """The ends of both axes of a chart, its top and its height in the drawing."""
+
+    across: tuple[float, float]
+    up: tuple[float, float]
+    top: float
+    height: float
+
+    def place(self, points: FloatArray) -> FloatArray:
+        """Return points (n, 2) of the chart as places in the drawing."""
+        (x0, x1), (y0, y1) = self.across, self.up
+        x = LEFT + (WIDTH - LEFT - RIGHT) * (points[:, 0] - x0) / (x1 - x0)
+        y = self.top + ABOVE + self.height * (y1 - points[:, 1]) / (y1 - y0)
+        return np.stack([x, y], axis=-1)
+
+    def draw(self, title: str, name: str, curves: Iterable[FloatArray]) -> Iterator[Element]:
+        """Yield axes and curves; the axis across has numbers if it has a name."""
+        origin = np.array([[self.across[0], self.up[0]], [self.across[1], self.up[1]]])
+        (left, bottom), (right, top) = self.place(origin).tolist()
+        (width, height), (x, y) = (right - left, bottom - top), np.diff(origin, axis=0)[0]
+
+        def words(value: float) -> str:
+            return format_number(value, 5) if name else ""
+
+        scale = width / x
+        yield drawing_text(title, 4.0, top - 8.0, "axis")
+        yield ruler(
+            name, self.across, left, scale, across=bottom, up=False, grid=height, words=words
+        )
+        yield ruler("", self.up, bottom, height / y, across=left, up=True, grid=width)
+        for curve, (colour, dash) in zip(curves, _LOOKS, strict=True):
+            path = path_of(self.place(curve), "", decimals=1)
+            look = {"stroke": css(colour), "stroke_dasharray": dash, "class_": "drive"}
+            yield element("path", d=path, **look)

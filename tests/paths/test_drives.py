@@ -1,0 +1,151 @@
+"""Drives: energy, bounds, scaling by time, a motion in closed form, and limits of paths."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from machines import six
+from numpy.testing import assert_allclose
+from refusals import refusal
+
+from explorer import PRESETS, Actuators, Design, NoAnswerError, Payload, Pose
+from explorer.legs.moves import StraightMoves
+from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import triple
+from explorer.paths.drives import Drives, check_limits
+from explorer.paths.time_law import TimeLaw, law_at_speed
+from explorer.prototype.chains import BODIES, Chains
+from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies, with_payload
+from explorer.statics.weights import MovingBodies
+
+EMPTY = PRESETS["paper-optimal"]
+OPTIMAL = msgspec.structs.replace(EMPTY, payload=Payload(2.0, (1, 0, 1)))
+HOME = OPTIMAL.home_pose
+X, Y, Z = HOME.position
+WAY = 3.0
+ALONG_GUIDE = [HOME, Pose((X + WAY, Y, Z), HOME.quaternion)]
+TOOL = (0.5, 1.0, -2.0)
+
+
+def random_path(seed: int) -> list[Pose]:
+    rng = np.random.default_rng(seed)
+    turns = np.array([-73.1, 0.0, 0.0]) + rng.uniform(-15.0, 15.0, (2, 3))
+    places = np.array(HOME.position) + rng.uniform(-2.0, 2.0, (2, 3))
+    pairs = zip(places, turns, strict=True)
+    return [HOME, *(Pose.of_yaw_pitch_roll(triple(p), triple(t)) for p, t in pairs)]
+
+
+def bodies_of(design: Design) -> MovingBodies:
+    return moving_bodies(design, bar_masses(design, DENSITY))
+
+
+def drives_of(design: Design, path: list[Pose], law: TimeLaw, tool: Triple | None = None) -> Drives:
+    return Drives.along(design, StraightMoves.along(path, tool), law, bodies_of(design))
+
+
+def law_of_duration(path: list[Pose], duration: float, tool: Triple | None = None) -> TimeLaw:
+    return law_at_speed(OPTIMAL, StraightMoves.along(path, tool)).lasting(duration)
+
+
+def potential_energy(design: Design, pose: Pose) -> float:
+    """Return the potential energy of all bodies in a pose, in joules."""
+    places = Chains.of(design).places_at(pose.position, pose.rotation)
+    energy = 0.0
+    for name, mass in with_payload(design, bar_masses(design, DENSITY)).items():
+        body = BODIES.index(name)
+        centre = 1e-3 * design.unit_mm * places.origin[body] + places.rotation[body] @ mass.centre
+        energy -= mass.mass * STANDARD_GRAVITY * float(centre @ np.array(design.gravity))
+    return energy
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_work_of_the_actuators_from_rest_to_rest_is_the_change_of_potential_energy(
+    seed: int,
+) -> None:
+    path = random_path(seed)
+    before, after = (potential_energy(OPTIMAL, pose) for pose in (path[0], path[-1]))
+    for law in (
+        law_of_duration(path, 0.4, TOOL),
+        law_at_speed(OPTIMAL, StraightMoves.along(path, TOOL), 20.0, 200.0),
+    ):
+        found = drives_of(OPTIMAL, path, law, TOOL)
+        work = float(found.mean(found.power).sum()) * found.law.duration
+        size = found.law.duration * float(found.figures.mean_power.sum())
+        assert work == pytest.approx(after - before, abs=1e-4 * size)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_peaks_bound_means_and_the_least_motor_bounds_all_actuators(seed: int) -> None:
+    path = random_path(seed)
+    found = drives_of(OPTIMAL, path, law_of_duration(path, 0.3))
+    assert found.law.duration == pytest.approx(0.3)
+    speed, force, steady, power, mean = found.figures
+    assert (steady <= force).all()
+    assert (mean <= power).all()
+    assert (power <= 1e-3 * force * speed).all()
+    for name, largest in found.least_motor.items():
+        assert largest == getattr(found.figures, name).max()
+
+
+def test_slower_law_has_slower_speeds_and_in_the_end_the_forces_at_rest() -> None:
+    path = random_path(1)
+    law = law_of_duration(path, 0.3)
+    found, slower = (drives_of(OPTIMAL, path, each) for each in (law, law.lasting(0.9)))
+    assert_allclose(slower.speed, found.speed / 3.0, rtol=1e-6, atol=1e-9)
+    assert_allclose(slower.acceleration, found.acceleration / 9.0, rtol=1e-6, atol=1e-6)
+    still = drives_of(OPTIMAL, path, law.lasting(3e4))
+    # What a motion adds to the forces at rest falls with the square of the time.
+    added, less = found.force - still.force, slower.force - still.force
+    assert_allclose(less, added / 9.0, atol=1e-6 * np.abs(added).max())
+
+
+def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
+    duration, mass = 0.5, 2.0
+    bodies = MovingBodies().with_mass(mass, (0.0, 0.0, 0.0))
+    law = law_of_duration(ALONG_GUIDE, duration)
+    found = Drives.along(OPTIMAL, StraightMoves.along(ALONG_GUIDE), law, bodies)
+    way = OPTIMAL.unit_mm * WAY
+    assert_allclose(found.figures.peak_speed[[1, 3]], 2.0 * way / duration, rtol=1e-3)
+    assert_allclose(np.abs(found.acceleration[:, [1, 3]]), 4.0 * way / duration**2, rtol=1e-2)
+    # The weight of the point does no work, so that all power is that of its inertia.
+    power = 1e-6 * mass * found.acceleration[:, 1] * found.speed[:, 1]
+    assert_allclose(found.power.sum(axis=1), power, atol=1e-3 * np.abs(power).max())
+
+
+def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
+    path = random_path(2)
+    law = law_of_duration(path, 0.3)
+    found = drives_of(OPTIMAL, path, law)
+    assert found.binding == (None,) * 6
+    limits = Actuators(
+        speed_mm_s=six(0.8 * found.figures.peak_speed),
+        push_n=six(2.0 * found.figures.peak_force),
+        continuous_n=six(found.figures.rms_force / [1.0, 1.0, 1.0, 1.0, 1.0, 1.5]),
+    )
+    *others, last = drives_of(msgspec.structs.replace(OPTIMAL, actuators=limits), path, law).binding
+    assert last == ("continuous force", pytest.approx(1.5), None)
+    for joint, each in enumerate(others):
+        assert each is not None
+        assert (each.limit, each.share) == ("speed", pytest.approx(1.25))
+        speed = np.interp(each.time or 0.0, found.time, np.abs(found.speed[:, joint]))
+        assert speed == pytest.approx(found.figures.peak_speed[joint])
+
+
+def test_path_without_length_or_through_a_singular_pose_is_refused() -> None:
+    assert "no length" in refusal(lambda: law_of_duration([HOME, HOME], 1.0))
+    assert "above zero" in refusal(law_of_duration, ALONG_GUIDE, math.nan)
+    through = [HOME, Pose((X, Y, 0.0), HOME.quaternion)]
+    with pytest.raises(NoAnswerError, match="singular"):
+        drives_of(OPTIMAL, through, law_of_duration(through, 1.0))
+
+
+def test_path_beyond_the_limits_is_refused_with_the_place_and_the_limit() -> None:
+    check_limits(OPTIMAL, StraightMoves.along(ALONG_GUIDE))
+    far = Pose((X, 40.0, Z), HOME.quaternion)
+    words = refusal(lambda: check_limits(OPTIMAL, StraightMoves.along([*ALONG_GUIDE, far])))
+    assert words.startswith("move 2 of the path leaves the limits at ")
+    assert "above its maximum" in words
