@@ -26,7 +26,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, lengths_of
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.statics.forces import load_array, twists_of_actuators
 from explorer.statics.reactions import LIMITED, Reactions, limit_shares, reactions
-from explorer.statics.weights import MOMENT, ROD, ROD_CENTRE, TOTAL, MovingBodies
+from explorer.statics.weights import FIRST_MOMENT, ROD, ROD_CENTRE, TOTAL, MovingBodies
 
 # Difference of bound and largest share, over that share, at which halving ends; and rounding.
 TOLERANCE, ROUNDING = 0.02, 1e-9
@@ -179,8 +179,9 @@ class DemandedLoad:
             sizes = np.array([lengths_of(self.load[:3]), mass * gravity])
             change = rotate(asked, forces) + angle * (speeds[:, :, 6:] @ sizes)
             change += angle * lengths_of(twists[:, :, 0, 3:]) * lengths_of(self.load[3:])
-            # The weights of the legs act at their joints, partly across the legs.
-            leaning = np.abs(legs[:, MOMENT] - legs[:, ROD] * legs[:, ROD_CENTRE])
+            # The weights of the legs act at their joints, partly across the legs, with the first
+            # moment over the length that `explorer.statics.weights.leg_inertia` swings.
+            leaning = np.abs(legs[:, FIRST_MOMENT] - legs[:, ROD] * legs[:, ROD_CENTRE])
             leaning = gravity * leaning / lengths[:, LENGTH_ROWS]
             standing = gravity * legs[:, TOTAL]
             tilting = 2.0 * leaning * tilt

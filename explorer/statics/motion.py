@@ -15,7 +15,10 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTH_ROWS, Design
 from explorer.mechanism.points import ACROSS
 from explorer.numerics.arrays import FloatArray, dot, rotate
-from explorer.statics.weights import ON_GUIDE, motion_array
+from explorer.statics.weights import motion_array
+
+IS_ON_GUIDE = np.array([False, True, True, False])
+"""Whether the carriage of each leg slides along the guide."""
 
 
 def joint_rates(
@@ -56,12 +59,12 @@ def joint_accelerations(
     turning, turning_rate = t[..., None, 3:], rate[..., None, 3:]
     swing = np.cross(turning, arms)
     velocity = t[..., None, :3] + swing
-    out = rate[..., None, :3] + np.cross(turning_rate, arms) + np.cross(turning, swing)
-    result = np.array(out[..., 0])
-    velocity, out = velocity[..., LENGTH_ROWS, :], out[..., LENGTH_ROWS, :]
-    velocity = np.where(ON_GUIDE[:, None], velocity * ACROSS, velocity)
+    of_ends = rate[..., None, :3] + np.cross(turning_rate, arms) + np.cross(turning, swing)
+    found = np.array(of_ends[..., 0])
+    velocity, of_ends = velocity[..., LENGTH_ROWS, :], of_ends[..., LENGTH_ROWS, :]
+    velocity = np.where(IS_ON_GUIDE[:, None], velocity * ACROSS, velocity)
     across = velocity - dot(c.leg_directions, velocity)[..., None] * c.leg_directions
     squares, lengths = dot(across, across), c.leg_lengths
     centripetal = np.divide(squares, lengths, out=np.zeros(squares.shape), where=lengths > 0.0)
-    result[..., LENGTH_ROWS] = dot(c.leg_directions, out) + centripetal
-    return result
+    found[..., LENGTH_ROWS] = dot(c.leg_directions, of_ends) + centripetal
+    return found

@@ -23,13 +23,15 @@ from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, along, column, cross3, dot3, norm3, times, vector
 from explorer.statics.forces import A3X, A3Y
 
-ON_GUIDE = np.array([False, True, True, False])
-FASTEST = 1e20
+LARGEST_RATE = 1e20
 """Largest entry of a twist or an acceleration, far below what makes forces overflow."""
 AT_REST = (0.0,) * 6
 
 # Columns of the rows of the legs, see `MovingBodies`.
-TOTAL, ROD, ROD_CENTRE, MOMENT, SIDE_X, SIDE_Y, SPIN, CROSS, AXIS_X, AXIS_Y, AXIS_Z = range(11)
+TOTAL, ROD, ROD_CENTRE, FIRST_MOMENT, SIDE_X, SIDE_Y, SPIN, CROSS = range(8)
+AXIS_X, AXIS_Y, AXIS_Z = range(8, 11)
+# First columns of the rows of `inertia_rows` after the wrench, and their number.
+AT_JOINTS, ALONG_GUIDE, OF_LEGS, COLUMNS = 6, 18, 20, 32
 
 
 @dataclass(frozen=True)
@@ -85,12 +87,12 @@ class MovingBodies:
 
 @dataclass(frozen=True)
 class Carried:
-    """What weights and inertia do in some poses or motions.
+    """The load of weights and inertia in some poses or motions.
 
     Attributes:
         wrench: (F; M) on the platform at the tool point, base axes, that stands for all of them,
             shape (..., 6), in N and N × unit.
-        at_joints: Parts of it that stand for the legs, at b1 to b4, shape (..., 4, 3), in N.
+        at_joints: Forces at b1 to b4 that stand for the legs, part of it, (..., 4, 3), in N.
         along_guide: Moments by which legs 2 and 3 change those of the forces of d1 and d3 at the
             carriages, shape (..., 2), in N × unit.
         legs: Weights and inertia of the legs, carriages included, shape (..., 4, 3), in N.
@@ -112,7 +114,7 @@ def payload_wrench(design: Design, rotation: FloatArray) -> FloatArray:
 
 def motion_array(name: str, value: ArrayLike) -> FloatArray:
     """Return a twist or an acceleration (..., 6) as float64 after checking it."""
-    return finite_array(f"the {name} (X Y Z, then turning)", value, (6,), FASTEST)
+    return finite_array(f"the {name} (X Y Z, then turning)", value, (6,), LARGEST_RATE)
 
 
 @helper
@@ -130,61 +132,68 @@ def acceleration_of(a: Vector, turning: Vector, turning_rate: Vector, arm: Vecto
 
 @helper
 def leg_inertia(
-    leg: Vector, v: Vector, a: Vector, g: Vector, on_guide: bool, m: FloatArray
+    leg: Vector, v: Vector, a: Vector, g: Vector, on_guide: bool, row: FloatArray
 ) -> tuple[Vector, Vector, float]:
-    """Return what a leg's weight and inertia do, given its vector and the motion of its end.
+    """Return the load of a leg's weight and inertia, given its vector and the motion of its end.
 
     Returns:
         The force at its end that stands for them, their sum, and the moment by which they change
         that of the force of its carriage, in N and N × unit.
     """
-    slide, first = 0.0, (m[AXIS_X], m[AXIS_Y], m[AXIS_Z])
+    slide, first = 0.0, (row[AXIS_X], row[AXIS_Y], row[AXIS_Z])
     if on_guide:
         slide = a[0]
         leg, v, a = (0.0, leg[1], leg[2]), (0.0, v[1], v[2]), (0.0, a[1], a[2])
     length = norm3(leg)
     if length == 0.0:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
-    n, total = m[ROD], m[TOTAL]
+    rod, total = row[ROD], row[TOTAL]
     s = along((0.0, 0.0, 0.0), 1.0 / length, leg)
-    # The leg's frame (x, y, s): y is the second axis of the universal joint. Along the first axis
-    # that is undefined, and the spin is taken as zero.
+    # The leg's frame (x, y, s): y is the second axis of the universal joint, and the first axis is
+    # sine x + cosine s. Along the first axis y is undefined, and the spin is taken as zero.
     y, cosine = cross3(s, first), dot3(s, first)
     sine = norm3(y)
     if sine > 0.0:
         y = along((0.0, 0.0, 0.0), 1.0 / sine, y)
     else:
         y, cosine, sine = (0.0, 0.0, 1.0), 0.0, 1.0
-    x, tangent = cross3(y, s), cosine / sine
-    # Angular velocity and acceleration, in this frame.
-    rate = dot3(s, v)
+    x, cotangent = cross3(y, s), cosine / sine
+    # Angular velocity w in this frame, from v = l̇ s + w × l s. The leg turns by φ̇ about the first
+    # axis and by w_y about y, so that w_x = φ̇ sine and w_z = φ̇ cosine.
+    length_rate = dot3(s, v)
     wx, wy = -dot3(y, v) / length, dot3(x, v) / length
-    wz = tangent * wx
+    wz = cotangent * wx
+    # Angular acceleration in this frame. With sine' = −w_y cosine and cosine' = w_y sine, φ̈ is
+    # (alpha_x + w_y w_z) / sine.
     square = wx * wx + wy * wy
-    ax = -(dot3(y, a) + 2.0 * rate * wx) / length + wy * wz
-    ay = (dot3(x, a) - 2.0 * rate * wy) / length - wx * wz
-    cross_rate = (ax + wy * wz) / sine
-    az = cosine * cross_rate + wx * wy
+    length_acceleration = dot3(s, a) + length * square
+    alpha_x = -(dot3(y, a) + 2.0 * length_rate * wx) / length + wy * wz
+    alpha_y = (dot3(x, a) - 2.0 * length_rate * wy) / length - wx * wz
+    first_acceleration = (alpha_x + wy * wz) / sine
+    alpha_z = cosine * first_acceleration + wx * wy
     # Euler's equations of cylinder and rod about the base joint.
-    back = length - m[ROD_CENTRE]
-    moment = m[MOMENT] + n * back
-    ix, iy, iz = m[SIDE_X] + n * back * back, m[SIDE_Y] + n * back * back, m[SPIN]
+    back = length - row[ROD_CENTRE]
+    first_moment = row[FIRST_MOMENT] + rod * back
+    ix = row[SIDE_X] + rod * back * back
+    iy, iz = row[SIDE_Y] + rod * back * back, row[SPIN]
     # The rod goes farther out, so that the inertia about the base joint grows at this rate.
-    growth = 2.0 * n * back * rate
-    tx = ix * ax + growth * wx + (iz - iy) * wy * wz + moment * dot3(y, g)
-    ty = iy * ay + growth * wy + (ix - iz) * wx * wz - moment * dot3(x, g)
-    tz = iz * az + (iy - ix) * wx * wy
-    about_first = tx + tangent * tz + m[CROSS] * cross_rate / sine
-    rate_change = dot3(s, a) + length * square
-    along_leg = n * (rate_change - back * square - dot3(s, g))
+    growth = 2.0 * rod * back * length_rate
+    tx = ix * alpha_x + growth * wx + (iz - iy) * wy * wz + first_moment * dot3(y, g)
+    ty = iy * alpha_y + growth * wy + (ix - iz) * wx * wz - first_moment * dot3(x, g)
+    tz = iz * alpha_z + (iy - ix) * wx * wy
+    # Their power is w_x (t_x + cotangent t_z + cross φ̈ / sine) + w_y t_y, and that of a force at
+    # the end, which moves by v_x = l w_y and v_y = −l w_x, is the opposite.
+    about_first = tx + cotangent * tz + row[CROSS] * first_acceleration / sine
+    along_leg = rod * (length_acceleration - back * square - dot3(s, g))
     across = total * (slide - g[0]) if on_guide else ty / length
     at_end = combine((-across, about_first / length, -along_leg), x, y, s)
-    # The sum of mass × acceleration is n a + swinging · l s̈, with l s̈ = a − l̈ s − 2 l̇ ṡ.
-    swinging = (m[MOMENT] - n * m[ROD_CENTRE]) / length
-    swing = along(a, -1.0, combine((2.0 * rate * wy, -2.0 * rate * wx, rate_change), x, y, s))
-    total_force = combine((total, -n, -swinging), g, a, swing)
+    # The sum of mass × acceleration is rod a + swinging · l s̈, with l s̈ = a − l̈ s − 2 l̇ ṡ.
+    swinging = (row[FIRST_MOMENT] - rod * row[ROD_CENTRE]) / length
+    turn = (2.0 * length_rate * wy, -2.0 * length_rate * wx, length_acceleration)
+    total_force = combine((total, -rod, -swinging), g, a, along(a, -1.0, combine(turn, x, y, s)))
     total_force = (total_force[0] - total * slide, total_force[1], total_force[2])
-    return at_end, total_force, (g[0] - slide) * (total * length - moment)
+    # Along the guide the centre is at first_moment / total from the carriage, the force at l.
+    return at_end, total_force, (g[0] - slide) * (total * length - first_moment)
 
 
 @kernel(
@@ -203,9 +212,9 @@ def inertia_rows(
     accelerations: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Write what weight and inertia do in n motions, shape (n, 32).
+    """Write the load of weights and inertia in n motions, shape (n, 32).
 
-    It is that of `Carried`: the wrench, but at b4, at the joints, along the guide, and of the legs.
+    A row has the four arrays of `Carried` in turn, the wrench about b4.
     """
     g = (gravity[0], gravity[1], gravity[2])
     mass = platform[3, 3]
@@ -222,9 +231,9 @@ def inertia_rows(
         torque = along(combine(own_rate, i, j, h), 1.0, cross3(own, combine(own, i, j, h)))
         # Mass × centre from b4, and mass × the acceleration of the centre beyond that of b4.
         first_moment = combine(column(platform, 3), x, y, z)
-        inwards = acceleration_of((0.0, 0.0, 0.0), turning, turning_rate, first_moment)
+        beyond = acceleration_of((0.0, 0.0, 0.0), turning, turning_rate, first_moment)
         from_b4 = along(g, -1.0, a)
-        force = along((-inwards[0], -inwards[1], -inwards[2]), mass, from_b4)
+        force = along((-beyond[0], -beyond[1], -beyond[2]), mass, from_b4)
         moment = along(cross3(first_moment, from_b4), -1.0, combine(torque, x, y, z))
         for leg in range(4):
             arm, on_guide = times(r, points[leg]), 0 < leg < 3
@@ -236,9 +245,10 @@ def inertia_rows(
             at_end, total, on_carriage = leg_inertia(end, end_v, end_a, g, on_guide, legs[leg])
             force, moment = along(force, 1.0, at_end), along(moment, 1.0, cross3(arm, at_end))
             if on_guide:
-                out[k, 17 + leg] = on_carriage
+                out[k, ALONG_GUIDE + leg - 1] = on_carriage
             for axis in range(3):
-                out[k, 6 + 3 * leg + axis], out[k, 20 + 3 * leg + axis] = at_end[axis], total[axis]
+                out[k, AT_JOINTS + 3 * leg + axis] = at_end[axis]
+                out[k, OF_LEGS + 3 * leg + axis] = total[axis]
         for axis in range(3):
             out[k, axis], out[k, 3 + axis] = force[axis], moment[axis]
 
@@ -249,7 +259,7 @@ def carry(
     twist: ArrayLike = AT_REST,
     acceleration: ArrayLike = AT_REST,
 ) -> Carried:
-    """Return what weight and inertia of bodies do at rest or in a motion.
+    """Return the load of weights and inertia of bodies at rest or in a motion.
 
     The twist and the acceleration are those of `explorer.statics.motion.joint_accelerations`, of b4
     whatever the tool of the configuration. Where a leg lies along the first axis of its universal
@@ -260,7 +270,7 @@ def carry(
     """
     t, rate = motion_array("twist", twist), motion_array("acceleration", acceleration)
     c, metres = configuration.spread(t, rate), 1e-3 * configuration.design.unit_mm
-    out = np.empty((len(c.positions), 32))
+    out = np.empty((len(c.positions), COLUMNS))
     inertia_rows(
         len(out),
         c.variables,
@@ -274,9 +284,9 @@ def carry(
         out,
     )
     # Masses times units/s² so far.
-    out = metres * out.reshape(*c.batch, 32)
-    wrench, along_guide = out[..., :6], out[..., 18:20]
+    parts = np.split(metres * out.reshape(*c.batch, COLUMNS), (AT_JOINTS, ALONG_GUIDE, OF_LEGS), -1)
+    wrench, at_joints, along_guide, legs = parts
     if c.tool.any():
         wrench[..., 3:] -= np.cross(c.arm, wrench[..., :3])
-    at_joints, of_legs = (out[..., i : i + 12].reshape(*c.batch, 4, 3) for i in (6, 20))
-    return Carried(wrench, at_joints, along_guide, of_legs)
+    at_joints, legs = (each.reshape(*c.batch, 4, 3) for each in (at_joints, legs))
+    return Carried(wrench, at_joints, along_guide, legs)

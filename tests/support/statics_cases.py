@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from explorer import Design, margins, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.motion import IS_ON_GUIDE
 from explorer.statics.weights import (
     AXIS_X,
-    MOMENT,
-    ON_GUIDE,
+    FIRST_MOMENT,
     ROD,
     ROD_CENTRE,
     TOTAL,
@@ -39,10 +39,10 @@ class LegMasses:
     def bodies(self) -> MovingBodies:
         """The legs as bodies; the carriages of legs 1 and 4 do not move."""
         rows = np.zeros((4, 11))
-        carriages = np.where(ON_GUIDE, self.carriages, 0.0)
+        carriages = np.where(IS_ON_GUIDE, self.carriages, 0.0)
         rows[:, TOTAL] = carriages + self.cylinders + np.array(self.rods)
         rows[:, ROD], rows[:, ROD_CENTRE] = self.rods, self.rod_centres
-        rows[:, MOMENT] = np.multiply(self.cylinders, self.cylinder_centres)
+        rows[:, FIRST_MOMENT] = np.multiply(self.cylinders, self.cylinder_centres)
         rows[:, AXIS_X] = 1.0
         return MovingBodies(legs=rows)
 
