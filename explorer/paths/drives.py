@@ -8,33 +8,63 @@ because most drives turn the power of a brake into heat.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from explorer.errors import InputError
+from explorer.errors import InputError, NoAnswerError
 from explorer.legs.moves import StraightMoves
 from explorer.measures.blocks import block
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.time_law import JointMotion, TimeLaw
+from explorer.paths.crossings import path_margins
+from explorer.paths.time_law import (
+    SINGULAR,
+    JointMotion,
+    TimeLaw,
+    law_at_speed,
+    law_of_shortest_time,
+)
+from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies
 from explorer.statics.weights import MovingBodies
-from explorer.workspace.limits.valid_moves import moves_are_valid
+from explorer.workspace.limits.valid_moves import LARGEST_TURN, moves_are_valid
 from explorer.workspace.limits.valid_poses import violations
 
 # Share of a limit from which it counts as exceeded, rather than used up to rounding.
 BEYOND = 1.0 + 1e-6
-# Places in an interval, and their weights in its mean by Simpson's rule. The end stays within it.
-PLACES, WEIGHTS = (0.0, 0.5, 1.0 - 1e-9), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+# Limits of an actuator of which a motion uses shares this close together all bind.
+CLOSE = 1e-3
+# Parts of an interval, and their weights in its mean by Simpson's rule. The end stays within it.
+PARTS, WEIGHTS = (0.0, 0.5, 1.0 - 1e-9), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+
+
+class TimedPath(NamedTuple):
+    """A path of straight moves with rest at every corner, its time, and what moves along it.
+
+    Attributes:
+        poses: Corners of the path, two or more.
+        duration: Duration in seconds, with the least acceleration of the fastest actuator; None for
+            the shortest time within the limits of the actuators, which needs the extra `timing`.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
+        density: Density of legs and platform in kg/m³, as bars with the legs' radii.
+        law: Time law of the path, in place of a duration.
+    """
+
+    poses: Sequence[Pose]
+    duration: float | None = None
+    tool: Triple | None = None
+    density: float = DENSITY
+    law: TimeLaw | None = None
 
 
 class Binding(NamedTuple):
-    """The limit of an actuator of which a motion uses the largest share.
+    """A limit of an actuator of which a motion uses the largest share.
 
     Attributes:
         limit: Its name.
@@ -47,8 +77,8 @@ class Binding(NamedTuple):
     time: float | None
 
 
-class Figures(NamedTuple):
-    """Numbers of the six actuators along a path, each of shape (6,).
+class Summary(NamedTuple):
+    """Peaks and means of the six actuators along a path, each of shape (6,).
 
     Attributes:
         peak_speed: Largest speeds to either side, in mm/s.
@@ -92,12 +122,12 @@ class Drives:
         Raises:
             NoAnswerError: The path is singular.
         """
-        time, number, share, rate, change = law.within_intervals(PLACES)
+        time, number, share, rate, change = law.within_intervals(PARTS)
         motion = JointMotion.along(design, moves, number, share, bodies)
         u, x = change[:, None], rate[:, None] ** 2
         speed = design.unit_mm * rate[:, None] * motion.slope
-        acceleration = design.unit_mm * (u * motion.slope + x * motion.bend)
-        force = motion.held + u * motion.by_u + x * motion.by_x
+        acceleration = design.unit_mm * (u * motion.slope + x * motion.curvature)
+        force = motion.at_rest + u * motion.by_u + x * motion.by_x
         return Drives(design, law, time, speed, acceleration, force)
 
     @property
@@ -106,17 +136,21 @@ class Drives:
         return 1e-3 * self.force * self.speed
 
     @cached_property
-    def figures(self) -> Figures:
+    def summary(self) -> Summary:
         """Peaks and means of each actuator."""
-        speed, force, power = (np.abs(each) for each in (self.speed, self.force, self.power))
-        rms_force, mean_power = np.sqrt(self.mean(force**2)), self.mean(power)
-        peaks = (each.max(axis=0) for each in (speed, force, power))
-        return Figures(next(peaks), next(peaks), rms_force, next(peaks), mean_power)
+        force, power = np.abs(self.force), np.abs(self.power)
+        return Summary(
+            peak_speed=np.abs(self.speed).max(axis=0),
+            peak_force=force.max(axis=0),
+            rms_force=np.sqrt(self.mean(force**2)),
+            peak_power=power.max(axis=0),
+            mean_power=self.mean(power),
+        )
 
     @property
     def least_motor(self) -> Mapping[str, float]:
-        """The least that one motor for all six has to hold: the largest of each of the figures."""
-        return {name: float(six.max()) for name, six in self.figures._asdict().items()}
+        """The least that one motor for all six has to hold: the largest of each in the summary."""
+        return {name: float(six.max()) for name, six in self.summary._asdict().items()}
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Return means over time of values at the times, of shape (n, ...)."""
@@ -125,26 +159,50 @@ class Drives:
         return weights @ values / self.law.duration
 
     @cached_property
-    def binding(self) -> tuple[Binding | None, ...]:
-        """For each actuator the limit of which it uses the most; None for one without limits."""
+    def binding(self) -> tuple[tuple[Binding, ...], ...]:
+        """For each actuator the limits of which it uses the most; none for one without limits."""
         limits, (push, pull) = self.design.actuators, self.design.actuators.limits
         shares = {
             "speed": np.abs(self.speed) / or_infinite(limits.speed_mm_s),
             "acceleration": np.abs(self.acceleration) / or_infinite(limits.acceleration_mm_s2),
             "push": self.force / push,
             "pull": -self.force / pull,
-            "continuous force": self.figures.rms_force[None] / or_infinite(limits.continuous_n),
+            "continuous force": self.summary.rms_force[None] / or_infinite(limits.continuous_n),
         }
-        found: list[Binding | None] = []
-        for joint in range(6):
-            name, used = max(
-                ((name, each[:, joint]) for name, each in shares.items()),
-                key=lambda named: float(named[1].max()),
-            )
-            time = float(self.time[used.argmax()]) if len(used) > 1 else None
-            share = float(used.max())
-            found.append(Binding(name, share, time) if share > 0.0 else None)
-        return tuple(found)
+
+        def most_used(joint: int) -> Iterator[Binding]:
+            largest = max(each[:, joint].max() for each in shares.values())
+            for name, each in shares.items():
+                used = each[:, joint]
+                if used.max() >= (1.0 - CLOSE) * largest > 0.0:
+                    time = float(self.time[used.argmax()]) if len(used) > 1 else None
+                    yield Binding(name, float(used.max()), time)
+
+        return tuple(tuple(most_used(joint)) for joint in range(6))
+
+
+def drives_along(design: Design, path: TimedPath) -> Drives:
+    """Return what a path within the limits of a design asks of its actuators.
+
+    Raises:
+        InputError: The path leaves the limits or has no length, the platform has no mass, or
+            nothing limits the time.
+        MissingExtraError: toppra is not installed.
+        NoAnswerError: The path is singular, or a weight exceeds the largest force at rest.
+    """
+    moves, law = StraightMoves.along(path.poses, path.tool), path.law
+    check_limits(design, moves)
+    # With a limit of the margins no path within the limits is singular.
+    if design.limits.margin is None:
+        singular = path_margins(path.poses, path.tool)
+        if singular.crossings or singular.lies_in:
+            raise NoAnswerError(SINGULAR)
+    bodies = moving_bodies(design, bar_masses(design, path.density))
+    if law is None and path.duration is not None:
+        law = law_at_speed(design, moves).lasting(path.duration)
+    elif law is None:
+        law = law_of_shortest_time(design, moves, bodies)
+    return Drives.along(design, moves, law, bodies)
 
 
 def check_limits(design: Design, moves: StraightMoves) -> None:
@@ -156,26 +214,31 @@ def check_limits(design: Design, moves: StraightMoves) -> None:
     numbers, ends = np.arange(len(moves.step)), np.array([0.0, 1.0])
     p, r = moves.poses(np.tile(numbers[:, None], 2), np.tile(ends, (len(numbers), 1)))
     valid = moves_are_valid(design, p[:, 0], r[:, 0], p[:, 1], r[:, 1], tool=moves.tool)
-    for move in np.flatnonzero(~valid).tolist():
-        which = "the path" if len(numbers) == 1 else f"move {move + 1} of the path"
-        share = np.linspace(0.0, 1.0, 101, dtype=np.float64)
-        c = Configuration(design, *moves.poses(np.full(len(share), move), share))
-        for percent, broken in enumerate(violations(c)):
-            if broken:
-                raise InputError(
-                    f"{which} leaves the limits at {percent} % of its way: {broken[0]}"
-                )
-        raise InputError(f"{which} does not keep the margins or clearances of the legs")
+    if valid.all():
+        return
+    move = int(valid.argmin())
+    which = "the path" if len(numbers) == 1 else f"move {move + 1} of the path"
+    if np.linalg.norm(moves.turn[move]) >= LARGEST_TURN:
+        raise InputError(f"{which} turns by half a turn, for which neither way is the shorter one")
+    share = np.linspace(0.0, 1.0, 101, dtype=np.float64)
+    c = Configuration(design, *moves.poses(np.full(len(share), move), share))
+    for percent, broken in enumerate(violations(c)):
+        if broken:
+            raise InputError(f"{which} leaves the limits at {percent} % of its way: {broken[0]}")
+    raise InputError(
+        f"{which} is not proved to keep the limits of the design: margins or clearances may be "
+        "too small between its ends"
+    )
 
 
 def drive_blocks(drives: Drives) -> Iterator[block.Block]:
     """Yield what a path asks of the actuators, and the least motor."""
-    units = (" mm/s", " N", " N", " W.")
+    units = (" mm/s,", " N peak force,", " N continuous force (RMS) and", " W peak power.")
     speed, force, steady, power = map(block.Number, [*drives.least_motor.values()][:4], units)
-    words = ("A motor that holds all this needs at least ", force, " peak, ", steady)
+    words = ("One motor for all six actuators needs at least ", speed, " ", force)
     yield block.Statement(
         "Least motor",
-        (*words, " continuous, ", speed, " and ", power),
+        (*words, " ", steady, " ", power),
         hint="The largest of the six actuators, in each number",
     )
     used = [*map(_binding_words, drives.binding)]
@@ -186,18 +249,20 @@ def drive_blocks(drives: Drives) -> Iterator[block.Block]:
             block.Names("actuator", JOINTS),
             *(
                 block.Column(title, six.tolist(), digits=4)
-                for title, six in zip(titles, drives.figures, strict=True)
+                for title, six in zip(titles, drives.summary, strict=True)
             ),
             *((block.Names("most used limit", used),) if any(drives.binding) else ()),
         ),
         "Mean power is the mean of its size: a brake's power counts too.",
-        ["beyond" if each and each.share > BEYOND else None for each in drives.binding],
+        ["beyond" if each and each[0].share > BEYOND else None for each in drives.binding],
     )
 
 
-def _binding_words(binding: Binding | None) -> block.Words:
-    if binding is None:
-        return "none is given"
-    at = "" if binding.time is None else f" at {binding.time:.3f} s"
-    share = binding.share if binding.share > BEYOND else min(binding.share, 1.0)
-    return f"{binding.limit} ", block.Share(share), at
+def _binding_words(binding: Sequence[Binding]) -> block.Words:
+    if not binding:
+        return "no limit"
+    share = binding[0].share if binding[0].share > BEYOND else min(binding[0].share, 1.0)
+    limits = (
+        each.limit + ("" if each.time is None else f" at {each.time:.3f} s") for each in binding
+    )
+    return block.Share(share), " of " + ", ".join(limits)

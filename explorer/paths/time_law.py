@@ -1,7 +1,7 @@
-"""Time laws: how a path of straight moves is gone through in time, from rest to rest.
+"""Time laws: when the platform is where on a path of straight moves, from rest to rest.
 
 A law keeps the geometry of its path, so that it stops at every corner, which only infinite
-accelerations would pass. It is the rate of the share of a move at grid points, between which the
+accelerations would pass. It has the rate of the share of a move at grid points, between which the
 second derivative of the share is constant.
 
 With x the squared rate and u the change of the rate, speeds bound x, and accelerations and forces
@@ -9,7 +9,7 @@ bound sums a u + b x. These bounds hold at both ends of every interval between g
 x changes by 2 u times its length. What holds the path at rest is assumed to be within the limits,
 so that x may be anything from zero to a greatest value, which toppra finds (Pham and Pham, "A New
 Approach to Time-Optimal Path Parameterization Based on Reachability Analysis", 2018). Last, the law
-is slowed down by the little by which a grid ten times finer shows it to exceed a limit.
+is slowed down until it exceeds no limit on a grid ten times finer.
 """
 
 from __future__ import annotations
@@ -34,8 +34,9 @@ from explorer.statics.motion import joint_accelerations, joint_rates
 from explorer.statics.weights import MovingBodies, carry
 
 DEFAULT_POINTS = 200
-# Least intervals of a move, and parts of an interval in which limits are checked.
-LEAST_INTERVALS, PARTS = 16, 10
+# Least intervals of a move, and steps of an interval after which limits are checked.
+LEAST_INTERVALS, STEPS = 16, 10
+SINGULAR = "the path is singular, so that no forces move the platform along it"
 # A squared rate that no path reaches, in the unit in which they are about one.
 UNBOUNDED = 1e8
 
@@ -93,9 +94,9 @@ class TimeLaw:
     def within_intervals(
         self, parts: Sequence[float]
     ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
-        """Return what the law is at parts of the intervals that take time, from 0 to below 1.
+        """Return times, moves, shares of them, their rates and second derivatives, (n,) each.
 
-        They are time, number of the move, share of it, its rate and second derivative, (n,) each.
+        They are those after some parts, from 0 to below 1, of each interval that takes time.
         """
         steps = np.diff(self.time)[:, None]
         time = (self.time[:-1, None] + steps * np.array(parts))[steps[:, 0] > 0.0].ravel()
@@ -110,13 +111,13 @@ class JointMotion(NamedTuple):
     """Motions of the joints and forces of the actuators at places of a path, (..., 6) each.
 
     With x the squared rate of the share of a move and u the change of the rate, the speeds are
-    slope √x, the accelerations slope u + bend x, and the forces held + by_u u + by_x x, in design
-    units, seconds and newtons.
+    slope √x, the accelerations slope u + curvature x, and the forces at_rest + by_u u + by_x x, in
+    design units, seconds and newtons.
     """
 
     slope: FloatArray
-    bend: FloatArray
-    held: FloatArray
+    curvature: FloatArray
+    at_rest: FloatArray
     by_u: FloatArray
     by_x: FloatArray
 
@@ -128,24 +129,27 @@ class JointMotion(NamedTuple):
         share: FloatArray,
         bodies: MovingBodies,
     ) -> JointMotion:
-        """Return those at shares of moves by number, shape (...) each.
+        """Return the motions and forces at shares of moves by number, shape (...) each.
 
         Raises:
             NoAnswerError: The path is singular there.
         """
         c = Configuration(design, *moves.poses(number, share))
         place, rest = (design, c.position, c.rotation), np.zeros(6)
-        twist, bend = moves.slopes(number, c.rotation)
-        held, with_u, with_x = (
+        twist, change = moves.slopes(number, c.rotation)
+        at_rest, with_u, with_x = (
             forces_of(c, carry(c, bodies, *motion).wrench)
-            for motion in ((rest, rest), (rest, twist), (twist, bend))
+            for motion in ((rest, rest), (rest, twist), (twist, change))
         )
-        if not np.isfinite(held).all():
-            raise NoAnswerError(
-                "the path is singular, so that no forces move the platform along it"
-            )
-        bends = joint_accelerations(*place, twist, bend)
-        return JointMotion(joint_rates(*place, twist), bends, held, with_u - held, with_x - held)
+        if not np.isfinite(at_rest).all():
+            raise NoAnswerError(SINGULAR)
+        return JointMotion(
+            joint_rates(*place, twist),
+            joint_accelerations(*place, twist, change),
+            at_rest,
+            with_u - at_rest,
+            with_x - at_rest,
+        )
 
 
 class Bounds(NamedTuple):
@@ -163,28 +167,29 @@ class Bounds(NamedTuple):
 
     @staticmethod
     def of(design: Design, motion: JointMotion) -> Bounds:
-        """Return those of the limits of a design.
+        """Return the bounds by the limits of a design.
 
         Raises:
             NoAnswerError: A weight exceeds the largest force of an actuator at rest.
         """
-        limits, (slope, bend, held, by_u, by_x) = design.actuators, motion
+        limits, (slope, curvature, at_rest, by_u, by_x) = design.actuators, motion
         speed, acceleration = (
             or_infinite(six) / design.unit_mm
             for six in (limits.speed_mm_s, limits.acceleration_mm_s2)
         )
         push, pull = limits.limits
-        share = np.maximum(held / push, -held / pull)
+        share = np.maximum(at_rest / push, -at_rest / pull)
         if share.max(initial=0.0) >= 1.0:
             place = np.unravel_index(share.argmax(), share.shape)
+            force = abs(at_rest[place])
             raise NoAnswerError(
-                f"no motion along the path keeps the limits: at rest the actuator of "
-                f"{JOINTS[int(place[-1])]} bears {abs(held[place]):.4g} N of at most "
-                f"{abs(held[place]) / share[place]:.4g} N"
+                f"no motion along the path keeps the limits: even at rest the actuator of "
+                f"{JOINTS[int(place[-1])]} needs {force:.4g} N, and its limit is "
+                f"{force / share[place]:.4g} N"
             )
         even = np.broadcast_to(acceleration, slope.shape)
-        most = np.concatenate([even, push - held, even, pull + held], axis=-1)
-        a, b = (np.concatenate(each, axis=-1) for each in ((slope, by_u), (bend, by_x)))
+        most = np.concatenate([even, push - at_rest, even, pull + at_rest], axis=-1)
+        a, b = (np.concatenate(each, axis=-1) for each in ((slope, by_u), (curvature, by_x)))
         fastest = np.divide(
             speed, np.abs(slope), out=np.full(slope.shape, np.inf), where=slope != 0
         )
@@ -247,7 +252,7 @@ def law_of_shortest_time(
         squares[move] = _greatest_squares(Bounds(*(each[move] for each in bounds)))
     law = TimeLaw.of(np.sqrt(squares))
     # Between grid points a limit may be exceeded by a little.
-    _, number, share, rate, change = law.within_intervals([i / PARTS for i in range(PARTS)])
+    _, number, share, rate, change = law.within_intervals([i / STEPS for i in range(STEPS)])
     finer = Bounds.of(design, JointMotion.along(design, moves, number, share, bodies))
     asked = (finer.a * change[:, None] + finer.b * rate[:, None] ** 2) / finer.most
     excess = max(1.0, asked.max(), (rate**2 / finer.square).max())

@@ -1,7 +1,7 @@
 """Trajectories: paths over time, with the joints.
 
-The fastest actuator has the given speed all along, so no other is faster, unless a time law of
-`explorer.paths.time_law` says otherwise. Samples are evenly spaced in time and lie on the path
+The fastest actuator has the given speed all along, so no other is faster, or the path has a time
+law of `explorer.paths.time_law`. Samples are evenly spaced in time and lie on the path
 exactly; their joints come from inverse kinematics.
 """
 
@@ -83,12 +83,14 @@ def trajectory(
 
     Raises:
         InputError: There are too few poses, too few or too many samples, the speed is not
-            positive, or the tool is not finite.
+            positive or given beside a law, or the tool is not finite.
     """
     if len(poses) < 2:
         raise InputError("a trajectory needs a path of at least two poses")
     if not 2 <= samples <= MOST_SAMPLES:
         raise InputError(f"a trajectory has 2 to {MOST_SAMPLES} samples; got {samples}")
+    if speed is not None and law is not None:
+        raise InputError("give a trajectory either a speed or a time law")
     actuator_speed = DEFAULT_SPEED * design.reach if speed is None else speed
     if not (math.isfinite(actuator_speed) and actuator_speed > 0.0):
         raise InputError(f"the speed must be above zero; got {actuator_speed:g}")

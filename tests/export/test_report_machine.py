@@ -19,7 +19,7 @@ from explorer.export.report.data import ReportData
 from explorer.export.report.workspace import worst_payload_force
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
-from explorer.prototype.dynamics import TimedPath, drives_along
+from explorer.paths.drives import TimedPath, drives_along
 from explorer.statics.reactions import Reactions, limit_shares
 from explorer.statics.weights import MovingBodies
 from explorer.workspace.carried_region import carried_region
@@ -216,7 +216,7 @@ def test_report_of_a_path_has_its_drives_and_the_corners_that_give_them_again() 
     path = TimedPath((home, Pose((12.0, 4.0, 8.0), home.quaternion)), 0.5)
     section = section_of(read(make_report(OPTIMAL, path=path).decode()), "Drives")
     rows, found = table_of(section, "Actuators along the path"), drives_along(OPTIMAL, path)
-    expected = found.figures[:3]
+    expected = found.summary[:3]
     for joint, *values in zip(JOINTS, *expected, strict=True):
         assert rows[joint].values[:3] == pytest.approx(values)
     (corners,) = (each.text for each in section.all("pre"))

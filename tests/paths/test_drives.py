@@ -16,7 +16,8 @@ from explorer.legs.moves import StraightMoves
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import triple
-from explorer.paths.drives import Drives, check_limits
+from explorer.paths.crossings import path_margins
+from explorer.paths.drives import Drives, TimedPath, check_limits, drives_along
 from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies, with_payload
@@ -74,7 +75,7 @@ def test_work_of_the_actuators_from_rest_to_rest_is_the_change_of_potential_ener
     ):
         found = drives_of(OPTIMAL, path, law, TOOL)
         work = float(found.mean(found.power).sum()) * found.law.duration
-        size = found.law.duration * float(found.figures.mean_power.sum())
+        size = found.law.duration * float(found.summary.mean_power.sum())
         assert work == pytest.approx(after - before, abs=1e-4 * size)
 
 
@@ -83,12 +84,12 @@ def test_peaks_bound_means_and_the_least_motor_bounds_all_actuators(seed: int) -
     path = random_path(seed)
     found = drives_of(OPTIMAL, path, law_of_duration(path, 0.3))
     assert found.law.duration == pytest.approx(0.3)
-    speed, force, steady, power, mean = found.figures
+    speed, force, steady, power, mean = found.summary
     assert (steady <= force).all()
     assert (mean <= power).all()
     assert (power <= 1e-3 * force * speed).all()
     for name, largest in found.least_motor.items():
-        assert largest == getattr(found.figures, name).max()
+        assert largest == getattr(found.summary, name).max()
 
 
 def test_slower_law_has_slower_speeds_and_in_the_end_the_forces_at_rest() -> None:
@@ -109,30 +110,50 @@ def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
     law = law_of_duration(ALONG_GUIDE, duration)
     found = Drives.along(OPTIMAL, StraightMoves.along(ALONG_GUIDE), law, bodies)
     way = OPTIMAL.unit_mm * WAY
-    assert_allclose(found.figures.peak_speed[[1, 3]], 2.0 * way / duration, rtol=1e-3)
+    assert_allclose(found.summary.peak_speed[[1, 3]], 2.0 * way / duration, rtol=1e-3)
     assert_allclose(np.abs(found.acceleration[:, [1, 3]]), 4.0 * way / duration**2, rtol=1e-2)
     # The weight of the point does no work, so that all power is that of its inertia.
     power = 1e-6 * mass * found.acceleration[:, 1] * found.speed[:, 1]
     assert_allclose(found.power.sum(axis=1), power, atol=1e-3 * np.abs(power).max())
 
 
-def test_binding_is_the_limit_of_the_largest_share_and_its_time() -> None:
+def test_binding_limits_are_those_of_the_largest_share_with_its_time() -> None:
     path = random_path(2)
     law = law_of_duration(path, 0.3)
     found = drives_of(OPTIMAL, path, law)
-    assert found.binding == (None,) * 6
+    assert found.binding == ((),) * 6
+    summary = found.summary
+    pull = summary.peak_force * [2.0, 2.0, 2.0, 2.0, 2.0, 0.8]
     limits = Actuators(
-        speed_mm_s=six(0.8 * found.figures.peak_speed),
-        push_n=six(2.0 * found.figures.peak_force),
-        continuous_n=six(found.figures.rms_force / [1.0, 1.0, 1.0, 1.0, 1.0, 1.5]),
+        speed_mm_s=six(0.8 * summary.peak_speed),
+        push_n=six(2.0 * summary.peak_force),
+        pull_n=six(np.minimum(pull, 2.0 * summary.peak_force)),
+        continuous_n=six(summary.rms_force / [1.5, 1.0, 1.0, 1.0, 1.25, 1.0]),
     )
-    *others, last = drives_of(msgspec.structs.replace(OPTIMAL, actuators=limits), path, law).binding
-    assert last == ("continuous force", pytest.approx(1.5), None)
-    for joint, each in enumerate(others):
-        assert each is not None
-        assert (each.limit, each.share) == ("speed", pytest.approx(1.25))
-        speed = np.interp(each.time or 0.0, found.time, np.abs(found.speed[:, joint]))
-        assert speed == pytest.approx(found.figures.peak_speed[joint])
+    limited = drives_of(msgspec.structs.replace(OPTIMAL, actuators=limits), path, law)
+    assert limited.binding[0] == (("continuous force", pytest.approx(1.5), None),)
+    assert [each.limit for each in limited.binding[4]] == ["speed", "continuous force"]
+    for joint, each in enumerate(limited.binding[1:4], 1):
+        (binding,) = each
+        assert (binding.limit, binding.share) == ("speed", pytest.approx(1.25))
+        speed = np.interp(binding.time or 0.0, found.time, np.abs(found.speed[:, joint]))
+        assert speed == pytest.approx(summary.peak_speed[joint])
+
+
+def test_path_through_a_singular_pose_between_its_samples_is_refused() -> None:
+    free = OPTIMAL.with_limits(margin=None, box=None)
+    through = [HOME, Pose((X + 0.3, Y + 0.2, -0.77 * Z), HOME.quaternion)]
+    assert path_margins(through).crossings
+    for duration in (1.0, None):
+        with pytest.raises(NoAnswerError, match="singular"):
+            drives_along(free, TimedPath(through, duration))
+
+
+def test_path_by_half_a_turn_is_refused_for_what_it_is() -> None:
+    free = OPTIMAL.with_limits(margin=None)
+    half = Pose.of_yaw_pitch_roll(HOME.position, (180.0 - 73.09, 0.0, 0.0))
+    start = Pose.of_yaw_pitch_roll(HOME.position, (-73.09, 0.0, 0.0))
+    assert "half a turn" in refusal(check_limits, free, StraightMoves.along([start, half]))
 
 
 def test_path_without_length_or_through_a_singular_pose_is_refused() -> None:

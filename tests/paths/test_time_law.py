@@ -82,8 +82,8 @@ def bodies_of(design: Design) -> MovingBodies:
 
 
 def shares_of_limits(design: Design, path: list[Pose], law: TimeLaw) -> np.ndarray:
-    """Return shares of speeds, accelerations and forces on a grid ten times finer, (n, 3, 6)."""
-    parts = np.linspace(0.0, 1.0, 10, endpoint=False, dtype=np.float64)
+    """Return shares of speeds, accelerations and forces between those of the law, (n, 3, 6)."""
+    parts = np.linspace(0.0, 1.0, 37, endpoint=False, dtype=np.float64)
     times = (law.time[:-1, None] + np.diff(law.time)[:, None] * parts).ravel()
     at, rate, change = law.places(times)
     moves, number = StraightMoves.along(path, TOOL), np.minimum(at.astype(int), len(path) - 2)
@@ -126,7 +126,7 @@ def test_law_of_shortest_time_exceeds_no_limit_and_uses_one_everywhere(seed: int
     design, path = random_case(seed)
     law = law_of_shortest_time(design, path, TOOL)
     shares = shares_of_limits(design, path, law)
-    assert shares.max() <= 1.0 + 1e-9
+    assert shares.max() <= 1.0 + 1e-6
     assert (shares.max(axis=(1, 2)) > 0.98).mean() > 0.98
     finer = law_of_shortest_time(design, path, TOOL, points=1600)
     assert law.duration == pytest.approx(finer.duration, rel=5e-3)
@@ -204,7 +204,7 @@ def test_law_without_a_limit_or_a_mass_is_refused_in_a_sentence() -> None:
 
 def test_law_of_a_path_that_cannot_be_held_or_is_singular_is_refused() -> None:
     weak = limited(1.0, 1.0, force=5.0)
-    with pytest.raises(NoAnswerError, match=r"at rest the actuator of .* of at most 5 N"):
+    with pytest.raises(NoAnswerError, match=r"at rest the actuator of .* its limit is 5 N"):
         law_of_shortest_time(weak, ALONG_GUIDE)
     through = [HOME, Pose((X, Y, 0.0), HOME.quaternion)]
     strong = limited(1.0, 1.0, force=1e6)

@@ -18,13 +18,11 @@ from explorer.files.writing import check_writable, read_at_most
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
-from explorer.paths import planning
+from explorer.paths import drives, planning
 from explorer.paths.crossings import path_margins
-from explorer.paths.drives import Drives as DrivesOfPath, drive_blocks
 from explorer.paths.loads import PathLoads, path_loads
 from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
-from explorer.prototype.dynamics import TimedPath, drives_along
 from explorer.prototype.weights import DENSITY
 from explorer.statics.reactions import LIMITED, PART_NAMES
 
@@ -32,7 +30,9 @@ INSTEAD = values.hint("instead of --from-quaternion")
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimedOptions(options.JsonOptions, options.EndOptions, options.PointOptions):
+class TimedOptions(
+    options.RadiiOptions, options.JsonOptions, options.EndOptions, options.PointOptions
+):
     """The options for the design, the two ends of a path, and its time."""
 
     from_: Annotated[
@@ -59,7 +59,7 @@ class TimedOptions(options.JsonOptions, options.EndOptions, options.PointOptions
     speed: Annotated[values.Positive, values.hint("default: a tenth of the reach")] = None
     """Speed of the fastest actuator, in design units per second."""
 
-    acceleration: Annotated[values.Positive, values.hint("default: at the speed at once")] = None
+    acceleration: Annotated[values.Positive, values.hint("optional")] = None
     """Acceleration with which the fastest actuator reaches this speed, and stops at every corner,
     in design units per s²."""
 
@@ -81,7 +81,7 @@ class TimedOptions(options.JsonOptions, options.EndOptions, options.PointOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class Path(options.RadiiOptions, TimedOptions):
+class Path(TimedOptions):
     """Plan a path between two poses within limits, margins and clearances.
 
     Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
@@ -112,6 +112,8 @@ class Path(options.RadiiOptions, TimedOptions):
             raise InputError(f"say where the path ends {options.END_OPTIONS}")
         if self.load is not None:
             options.check_has_limits(design)
+        if self.out is not None and self.out == self.corners:
+            raise InputError(f"--out and --corners need two files; got {self.out} for both")
         for file in filter(None, (self.out, self.corners)):
             check_writable(file)
         try:
@@ -123,8 +125,9 @@ class Path(options.RadiiOptions, TimedOptions):
                 output.write_json({"found": False, "reason": error.reason, "poses": []})
             raise
         law = self.law(design, path.poses)
+        speed = self.speed if law is None else None
         timed = trajectory(
-            design, path.poses, speed=self.speed, samples=self.samples, tool=tool, law=law
+            design, path.poses, speed=speed, samples=self.samples, tool=tool, law=law
         )
         loads = None
         if self.load is not None:
@@ -132,16 +135,18 @@ class Path(options.RadiiOptions, TimedOptions):
         texts = {self.corners: corners_csv(path.poses, tool), self.out: trajectory_csv(timed)}
         files = {file: text.encode() for file, text in texts.items() if file is not None}
         written, errors = options.write_files(files)
-        out = self.out if self.out in written else None
+        names = {self.out: "file", self.corners: "corners_file"}
+        rows = {self.out: f"{len(timed.time)} rows", self.corners: f"{len(path.poses)} corners"}
+        lines = [*_path_lines(design, path, timed, loads), *([""] if written else [])]
         self.write(
-            lambda: _path_json(path, timed, loads, out),
-            _path_lines(design, path, timed, loads, out),
+            lambda: _path_json(path, timed, loads) | {names[file]: file for file in written},
+            [*lines, *(f"{rows[file]} in {file}" for file in written)],
             errors,
         )
 
 
 def _path_json(
-    path: planning.PlannedPath, timed: Trajectory, loads: PathLoads | None, out: File | None
+    path: planning.PlannedPath, timed: Trajectory, loads: PathLoads | None
 ) -> dict[str, object]:
     names = "time joints position quaternion" + (" tool_position" if path.tool else "")
     largest = loads and {
@@ -158,7 +163,6 @@ def _path_json(
         "duration": timed.duration,
         "trajectory": output.attributes(timed, names),
         **(largest or {}),
-        **({} if out is None else {"file": out}),
     }
 
 
@@ -167,7 +171,6 @@ def _path_lines(
     path: planning.PlannedPath,
     timed: Trajectory,
     loads: PathLoads | None,
-    out: File | None,
 ) -> Iterator[str]:
     least = path_margins(path.poses, tool=path.tool).least
     plural = "" if path.checked == 1 else "s"
@@ -192,8 +195,6 @@ def _path_lines(
             words += f": {PART_NAMES[loads.part]}, at {output.figure(seconds)} s"
         rows.append(("load", words))
     yield from ("", output.table(rows, "<<"))
-    if out is not None:
-        yield from ("", f"{len(timed.time)} rows in {out}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,9 +202,9 @@ class Drives(TimedOptions):
     """Compute speeds, forces and powers of the actuators along a path; the least motor.
 
     A path rests at every corner. It takes the shortest time within the design's limits of speeds,
-    accelerations and forces, which needs the extra `timing`; or `--duration`; or it has `--speed`
-    and `--acceleration`. Forces hold and accelerate platform, payload and legs; friction and the
-    rotors of motors are left out.
+    accelerations and forces, which needs the extra `timing`; or `--duration`; or the time that
+    `--acceleration` and `--speed` give. Forces hold and accelerate platform, payload and legs;
+    friction and the rotors of motors are left out.
     """
 
     path: Annotated[File | None, values.hint("instead of --from and --to", "FILE")] = None
@@ -225,7 +226,7 @@ class Drives(TimedOptions):
 
     def run(self) -> None:
         """Write what the path asks of the actuators."""
-        design = self.read_design()
+        design = self.with_radii(self.read_design())
         payload = options.replace_given(design.payload, mass_kg=self.payload)
         design = options.replace_given(design, payload=payload)
         if self.out is not None:
@@ -236,11 +237,12 @@ class Drives(TimedOptions):
             raise InputError("--speed needs --acceleration: a path starts and ends at rest")
         if self.duration is not None and law is not None:
             raise InputError("give either --duration, or --speed and --acceleration")
-        found = drives_along(design, TimedPath(poses, law or self.duration, tool, self.density))
+        path = drives.TimedPath(poses, self.duration, tool, self.density, law)
+        found = drives.drives_along(design, path)
         timed = trajectory(design, poses, law=found.law, samples=self.samples, tool=tool)
         files = {} if self.out is None else {self.out: drives_csv(found, timed).encode()}
         written, errors = options.write_files(files)
-        lines = [output.heading(design), *output.block_lines(drive_blocks(found))]
+        lines = [output.heading(design), *output.block_lines(drives.drive_blocks(found))]
         lines += [line for file in written for line in ("", f"{self.samples} rows in {file}")]
         self.write(lambda: _drives_json(found, written), lines, errors)
 
@@ -254,7 +256,9 @@ class Drives(TimedOptions):
                 )
             return start, goal
         if goal is not None or start != design.home_pose:
-            raise InputError("--path has the ends of the path; leave --from and --to out")
+            raise InputError(
+                "--path has the ends of the path: leave out --from and --to, and their orientations"
+            )
         table = parse_table(str(self.path), read_at_most(self.path, MOST_BYTES), design.unit_mm)
         if "time" in table.columns:
             raise InputError(
@@ -265,11 +269,11 @@ class Drives(TimedOptions):
         return tuple(Pose.of(*each) for each in zip(c.positions, c.rotations, strict=True))
 
 
-def _drives_json(found: DrivesOfPath, written: Sequence[File]) -> dict[str, object]:
+def _drives_json(found: drives.Drives, written: Sequence[File]) -> dict[str, object]:
     return {
-        **found.figures._asdict(),
+        **found.summary._asdict(),
         "duration": found.law.duration,
-        "binding": [each and each._asdict() for each in found.binding],
+        "binding": [[each._asdict() for each in limits] for limits in found.binding],
         "least_motor": found.least_motor,
         **({"file": written[0]} if written else {}),
     }

@@ -14,7 +14,7 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.paths.drives import PLACES, Drives
+from explorer.paths.drives import PARTS, Drives
 from explorer.singularity.colours import Rgb, css
 
 # The width of the charts, the height of one over time and of that of forces and speeds, and the
@@ -76,7 +76,7 @@ def _svg(height: float, title: str, pieces: Iterable[Element]) -> Element:
 
 def _drawn(values: FloatArray) -> FloatArray:
     """Return those of values (n, ...) that are drawn: the first of each interval, and the last."""
-    return np.concatenate([values[:: len(PLACES)], values[-1:]])
+    return np.concatenate([values[:: len(PARTS)], values[-1:]])
 
 
 def _ends(values: Iterable[float]) -> tuple[float, float]:

@@ -19,8 +19,8 @@ from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.machine import Payload, Tool
 from explorer.numerics.arrays import triple
 from explorer.optimise.outcome import Record
+from explorer.paths.drives import TimedPath
 from explorer.prototype.assembly import Bill, bill_of_materials, make_prototype
-from explorer.prototype.dynamics import TimedPath
 from explorer.prototype.weights import DENSITY
 from explorer.statics.compliance import largest_deflection
 from explorer.statics.loaded import LoadedPose, ToolPrecision

@@ -25,8 +25,7 @@ from explorer.mechanism.machine import Tool
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.paths.drives import drive_blocks
-from explorer.prototype.dynamics import drives_along
+from explorer.paths.drives import drive_blocks, drives_along
 from explorer.singularity.colours import WARN_SHARE
 from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.workspace.carried_region import CarriedRegion

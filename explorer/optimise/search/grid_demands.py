@@ -289,7 +289,7 @@ class AccelerationDemand(LoadDemand):
         self.names = tuple(name.replace("load of", "acceleration by", 1) for name in self.names)
 
     def measure(self, state: State) -> Measured:
-        """Return the accelerations over the least one, less 1, bounded above by 1."""
+        """Return v − 1 for accelerations of v times the least one; 1 − 1/v where v exceeds 1."""
         box, counts = state.statics, self.side.keeps(state, state.statics.positions)
         if not counts.any():
             return _miss_beyond_plane(state, self.side, len(self.names))

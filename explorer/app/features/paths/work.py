@@ -12,8 +12,7 @@ from explorer.export.drawings.drives import force_speed_chart, time_charts
 from explorer.export.drawings.markup import as_html
 from explorer.measures.blocks.block import Block
 from explorer.mechanism.design import Design
-from explorer.paths.drives import drive_blocks
-from explorer.prototype.dynamics import TimedPath, drives_along
+from explorer.paths.drives import TimedPath, drive_blocks, drives_along
 
 DrivesRequest: TypeAlias = tuple[Design, TimedPath]
 """A path of a design."""

@@ -12,7 +12,7 @@ from typing import Literal
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 from explorer.optimise.outcome import Record
-from explorer.prototype.dynamics import TimedPath
+from explorer.paths.drives import TimedPath
 
 ReportFormat = Literal["html", "pdf"]
 
