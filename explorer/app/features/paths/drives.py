@@ -24,7 +24,7 @@ class DrivesPanel:
     def __init__(self, services: Services, controls: Controls) -> None:
         self._feed = services.get(DRIVES_FEED)
         controls.dropdown(
-            "Speeds and forces",
+            "Time law",
             "Compute what the path asks of the actuators if the platform rests at every corner: in "
             "the shortest time within the limits of the tab Machine, or in a given time.",
             KINDS,
@@ -49,7 +49,7 @@ class DrivesPanel:
         elif paths.drives == "shortest" and self._missing:
             html = self._missing
         else:
-            html = html_of(self._feed, drives_html, "Speeds and forces")
+            html = html_of(self._feed, drives_html, "Drives")
         yield from show_html(self._html, html)
 
 
