@@ -141,6 +141,12 @@ class StraightMoves:
         p, r = np.array([e.position for e in poses]), np.array([e.rotation for e in poses])
         return StraightMoves.between(p[:-1], r[:-1], p[1:], r[1:], tool)
 
+    @property
+    def have_length(self) -> BoolArray:
+        """Whether each move is longer than rounding, shape (n,)."""
+        goes = arrays.lengths_of(self.step) > NO_LENGTH * np.abs(self.start).max(initial=0.0)
+        return goes | (arrays.lengths_of(self.turn) > NO_LENGTH)
+
     def poses(self, number: IntArray, share: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return b4 (..., 3) and rotations (..., 3, 3) at shares, 0 to 1, of moves by number."""
         turn = Rotation.from_rotvec(share[..., None] * self.turn[number])

@@ -17,6 +17,7 @@ import pytest
 from client import wait_for
 from desk import Desk
 from hypothesis import given, strategies as st
+from worker_process import process_id
 
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.features.feature import Services
@@ -715,7 +716,7 @@ def test_study_whose_process_dies_is_reported_and_keeps_what_is_finished(studio:
 
     # Once there is something to keep.
     wait_for(is_begun, PATIENCE)
-    number = studio.runner.worker.process_id
+    number = process_id(studio.runner.worker)
     assert number is not None
     os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
     assert studio.runner.wait_until_idle(PATIENCE)

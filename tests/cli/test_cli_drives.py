@@ -76,6 +76,12 @@ def test_drives_refuse_what_is_no_path_in_time(
     assert reason in cli.refusal(*words)
 
 
+def test_path_refuses_one_file_for_corners_and_trajectory(cli: CommandLine, tmp_path: Path) -> None:
+    file = tmp_path / "path.csv"
+    path = replace(cli, command=("path",))
+    assert "need two files" in path.refusal(*MOVE[:4], "--out", file, "--corners", file)
+
+
 def test_drives_refuse_a_path_that_is_in_time_already(cli: CommandLine, tmp_path: Path) -> None:
     table = tmp_path / "path.csv"
     table.write_text("time_s,x,y,z\n0,10,5,9\n1,11,5,9\n", encoding="utf-8")

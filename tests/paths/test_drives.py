@@ -157,7 +157,10 @@ def test_path_by_half_a_turn_is_refused_for_what_it_is() -> None:
 
 
 def test_path_without_length_or_through_a_singular_pose_is_refused() -> None:
-    assert "no length" in refusal(lambda: law_of_duration([HOME, HOME], 1.0))
+    for rounding in (0.0, 1e-14):
+        nearby = Pose((X + rounding, Y, Z), HOME.quaternion)
+        assert "no length" in refusal(law_of_duration, [HOME, nearby], 1.0)
+    assert "10000 moves" in refusal(law_of_duration, [*ALONG_GUIDE] * 5001, 1.0)
     assert "above zero" in refusal(law_of_duration, ALONG_GUIDE, math.nan)
     through = [HOME, Pose((X, Y, 0.0), HOME.quaternion)]
     with pytest.raises(NoAnswerError, match="singular"):

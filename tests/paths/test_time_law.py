@@ -70,11 +70,9 @@ def random_case(seed: int) -> tuple[Design, list[Pose]]:
     return msgspec.structs.replace(design, actuators=actuators), [HOME, *poses]
 
 
-def law_of_shortest_time(
-    design: Design, path: list[Pose], tool: Triple | None = None, **options: int
-) -> TimeLaw:
-    moves, bodies = StraightMoves.along(path, tool), bodies_of(design)
-    return time_law.law_of_shortest_time(design, moves, bodies, **options)
+def law_of_shortest_time(design: Design, path: list[Pose], tool: Triple | None = None) -> TimeLaw:
+    moves = StraightMoves.along(path, tool)
+    return time_law.law_of_shortest_time(design, moves, bodies_of(design))
 
 
 def bodies_of(design: Design) -> MovingBodies:
@@ -122,13 +120,16 @@ def test_laws_along_the_guide_have_the_time_of_a_bang_bang_motion(
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_law_of_shortest_time_exceeds_no_limit_and_uses_one_everywhere(seed: int) -> None:
+def test_law_of_shortest_time_exceeds_no_limit_and_uses_one_everywhere(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     design, path = random_case(seed)
     law = law_of_shortest_time(design, path, TOOL)
     shares = shares_of_limits(design, path, law)
     assert shares.max() <= 1.0 + 1e-6
     assert (shares.max(axis=(1, 2)) > 0.98).mean() > 0.98
-    finer = law_of_shortest_time(design, path, TOOL, points=1600)
+    monkeypatch.setattr(time_law, "POINTS", 10 * time_law.POINTS)
+    finer = law_of_shortest_time(design, path, TOOL)
     assert law.duration == pytest.approx(finer.duration, rel=5e-3)
 
 
@@ -200,6 +201,19 @@ def test_law_without_a_limit_or_a_mass_is_refused_in_a_sentence() -> None:
         words = refusal(law_at_speed, OPTIMAL, moves, speed, acceleration)
         assert "above zero" in words
     assert "no length" in refusal(law_at_speed, OPTIMAL, StraightMoves.along([HOME]), 1.0, 1.0)
+
+
+def test_shortest_time_of_a_move_that_barely_needs_some_actuators_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(time_law, "POINTS", 16)
+    # The struts of legs 2 and 3 move by millionths of the travel of the carriages.
+    design = limited(1.0, 10.0, force=100.0)
+    actuators = msgspec.structs.replace(design.actuators, speed_mm_s=None)
+    ends = [(X + 0.5 * math.cos(t), Y + 0.5 * math.sin(t), Z) for t in (4.6811, 4.6811 + 0.0628)]
+    path = [Pose(end, HOME.quaternion) for end in ends]
+    law = law_of_shortest_time(msgspec.structs.replace(design, actuators=actuators), path)
+    assert law.duration == pytest.approx(2.0 * math.sqrt(0.0314 / 10.0), rel=1e-3)
 
 
 def test_law_of_a_path_that_cannot_be_held_or_is_singular_is_refused() -> None:

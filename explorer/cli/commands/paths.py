@@ -244,7 +244,14 @@ class Drives(TimedOptions):
         written, errors = options.write_files(files)
         lines = [output.heading(design), *output.block_lines(drives.drive_blocks(found))]
         lines += [line for file in written for line in ("", f"{self.samples} rows in {file}")]
-        self.write(lambda: _drives_json(found, written), lines, errors)
+        answer: dict[str, object] = {
+            **found.summary._asdict(),
+            "duration": found.law.duration,
+            "binding": [[each._asdict() for each in limits] for limits in found.binding],
+            "least_motor": found.least_motor,
+            **({"file": written[0]} if written else {}),
+        }
+        self.write(lambda: answer, lines, errors)
 
     def _poses(self, design: Design) -> tuple[Pose, ...]:
         """Return the corners of the path."""
@@ -267,13 +274,3 @@ class Drives(TimedOptions):
             )
         c = read_poses(table, design, start.rotation, self.at)
         return tuple(Pose.of(*each) for each in zip(c.positions, c.rotations, strict=True))
-
-
-def _drives_json(found: drives.Drives, written: Sequence[File]) -> dict[str, object]:
-    return {
-        **found.summary._asdict(),
-        "duration": found.law.duration,
-        "binding": [[each._asdict() for each in limits] for limits in found.binding],
-        "least_motor": found.least_motor,
-        **({"file": written[0]} if written else {}),
-    }

@@ -23,7 +23,11 @@ WIDTH, HEIGHT, TALL = 340.0, 84.0, 240.0
 LEFT, RIGHT, ABOVE, BELOW, LEGEND = 46.0, 12.0, 24.0, 38.0, 16.0
 # A colour for each leg; the actuator along the guide is dashed.
 _LEGS: tuple[Rgb, ...] = ((46, 116, 208), (202, 112, 12), (22, 146, 118), (186, 64, 128))
-_LOOKS = [(_LEGS[leg], "5 3" if d in (1, 3) else None) for d, leg in enumerate((0, 1, 1, 2, 2, 3))]
+_LOOKS = [
+    {"stroke": css(_LEGS[leg]), "stroke_dasharray": "5 3" if d in (1, 3) else None, "fill": "none"}
+    for d, leg in enumerate((0, 1, 1, 2, 2, 3))
+]
+_LIMIT = {"stroke": "currentColor", "stroke_dasharray": "2 2.5", "fill": "none"}
 # Room beyond the values of an axis, as a share of their span.
 ROOM = 0.06
 
@@ -61,17 +65,15 @@ def force_speed_chart(drives: Drives) -> Element:
     boxes = np.unique(sides.reshape(4, 6), axis=1).T if np.isfinite(limits).any() else ()
     for x0, x1, y0, y1 in boxes:
         path = path_of(chart.place(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])))
-        pieces.append(element("path", d=path, class_="limit"))
+        pieces.append(element("path", d=path, **_LIMIT))
     words = "Forces of the actuators against their speeds"
     return _svg(LEGEND + ABOVE + TALL + BELOW, words, pieces)
 
 
 def _svg(height: float, title: str, pieces: Iterable[Element]) -> Element:
-    view = f"0 0 {coordinate(WIDTH)} {coordinate(height)}"
-    look = {"class_": "drives", "viewBox": view, "role": "img"}
-    return element(
-        "svg", element("title", title), *pieces, xmlns="http://www.w3.org/2000/svg", **look
-    )
+    look = {"viewBox": f"0 0 {coordinate(WIDTH)} {coordinate(height)}", "role": "img"}
+    pieces = element("title", title), *pieces
+    return element("svg", *pieces, xmlns="http://www.w3.org/2000/svg", **look)
 
 
 def _drawn(values: FloatArray) -> FloatArray:
@@ -88,9 +90,8 @@ def _ends(values: Iterable[float]) -> tuple[float, float]:
 
 
 def _legend() -> Iterator[Element]:
-    for index, (name, (colour, dash)) in enumerate(zip(JOINTS, _LOOKS, strict=True)):
+    for index, (name, look) in enumerate(zip(JOINTS, _LOOKS, strict=True)):
         x = LEFT + 48.0 * index
-        look = {"stroke": css(colour), "stroke_dasharray": dash, "class_": "drive"}
         yield element("line", x1=x, y1=8.0, x2=x + 20.0, y2=8.0, **look)
         yield drawing_text(name, x + 24.0, 12.0)
 
@@ -125,7 +126,5 @@ class _Chart(NamedTuple):
             name, self.across, left, scale, across=bottom, up=False, grid=height, words=words
         )
         yield ruler("", self.up, bottom, height / y, across=left, up=True, grid=width)
-        for curve, (colour, dash) in zip(curves, _LOOKS, strict=True):
-            path = path_of(self.place(curve), "", decimals=1)
-            look = {"stroke": css(colour), "stroke_dasharray": dash, "class_": "drive"}
-            yield element("path", d=path, **look)
+        for curve, look in zip(curves, _LOOKS, strict=True):
+            yield element("path", d=path_of(self.place(curve), "", decimals=1), **look)

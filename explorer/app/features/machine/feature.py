@@ -241,9 +241,7 @@ class MachinePanel:
 def _with_units(words: str) -> str:
     """Return words as HTML in which no line ends between a number and its unit."""
     return re.sub(
-        r"(?<=\d) (kg|N m|N|mm/s²|mm/s)(?!\w)",
-        lambda unit: unit[0].replace(" ", "&nbsp;"),
-        escape(words),
+        r"(?<=\d) (kg|N m|N|mm/s²?)(?!\w)", lambda u: u[0].replace(" ", "&nbsp;"), escape(words)
     )
 
 
@@ -280,8 +278,14 @@ def machine_words(design: Design, unit: Unit) -> str:
     free = [f"the {name}" for name, words in limits.items() if not words]
     has = "has" if free == ["the guide"] else "have"
     no_limit = f"{' and '.join(free)} {has} no limit" if free else ""
-    parts += [*limits.values(), _motion_words(design.actuators)]
-    parts.append("no force is limited" if len(free) == 3 else no_limit)
+    actuators = design.actuators
+    for six, name, unit_name in (
+        (actuators.continuous_n, "continuous forces", "N"),
+        (actuators.speed_mm_s, "speeds", "mm/s"),
+        (actuators.acceleration_mm_s2, "accelerations", "mm/s²"),
+    ):
+        limits[name] = f"{name} up to {_range(np.array(six))} {unit_name}" if six else ""
+    parts += [*limits.values(), "no force is limited" if len(free) == 3 else no_limit]
     line = "; ".join(filter(None, parts))
     return f"{line[:1].upper()}{line[1:]}."
 
@@ -315,17 +319,6 @@ def _actuator_words(actuators: Actuators) -> str:
     sides = {"push": push, "pull": pull}
     words = [f"{side} up to {_range(most)} N" for side, most in sides.items() if most[0] < math.inf]
     return f"actuators {' and '.join(words)}"
-
-
-def _motion_words(actuators: Actuators) -> str:
-    limits = (
-        (actuators.continuous_n, "continuous forces", "N"),
-        (actuators.speed_mm_s, "speeds", "mm/s"),
-        (actuators.acceleration_mm_s2, "accelerations", "mm/s²"),
-    )
-    return "; ".join(
-        f"{name} up to {_range(np.array(six))} {unit}" for six, name, unit in limits if six
-    )
 
 
 def _text(value: float) -> str:
