@@ -225,23 +225,19 @@ def check_limits(design: Design, moves: StraightMoves) -> None:
     for percent, broken in enumerate(violations(c)):
         if broken:
             raise InputError(f"{which} leaves the limits at {percent} % of its way: {broken[0]}")
-    raise InputError(
-        f"{which} is not proved to keep the limits of the design: margins or clearances may be "
-        "too small between its ends"
-    )
+    raise InputError(f"{which} is not proved to keep the margins and clearances all along")
 
 
 def drive_blocks(drives: Drives) -> Iterator[block.Block]:
     """Yield what a path asks of the actuators, and the least motor."""
     units = (" mm/s,", " N peak force,", " N continuous force (RMS) and", " W peak power.")
     speed, force, steady, power = map(block.Number, [*drives.least_motor.values()][:4], units)
-    words = ("One motor for all six actuators needs at least ", speed, " ", force)
+    used = [*map(_binding_words, drives.binding)]
     yield block.Statement(
         "Least motor",
-        (*words, " ", steady, " ", power),
+        ("One motor for all six needs at least ", speed, " ", force, " ", steady, " ", power),
         hint="The largest of the six actuators, in each number",
     )
-    used = [*map(_binding_words, drives.binding)]
     titles = "peak speed, mm/s", "peak force, N", "RMS force, N", "peak power, W", "mean power, W"
     yield block.Table(
         f"Actuators along the path, {drives.law.duration:.4g} s",

@@ -277,9 +277,12 @@ def _greatest_squares(bounds: Bounds) -> FloatArray:
     at_both_ends = constraint.canlinear_colloc_to_interpolate(
         *rows, np.diag(ones), ones, None, None, shares, identical=True
     )
+
+    def numbers_of(*_: object) -> tuple[object, ...]:
+        return (*at_both_ends[:5], None, span)
+
     limits, path = constraint.LinearConstraint(), SimpleNamespace(path_interval=(0.0, 1.0))
-    limits.identical = True
-    limits.compute_constraint_params = lambda *_: (*at_both_ends[:5], None, span)
+    limits.identical, limits.compute_constraint_params = True, numbers_of
     search = algorithm.TOPPRA([limits], path, gridpoints=shares, solver_wrapper="seidel")
     search.compute_parameterization(0.0, 0.0)
     rates = search.problem_data.sd_vec

@@ -20,7 +20,6 @@ from desk import Desk, number, rows_of
 from limited_designs import limited
 from sample_states import iterates_of
 from services import services_for
-from worker_process import process_id
 
 from explorer import Actuators, Payload, Struts
 from explorer.app.features.optimise import runner as optimiser
@@ -214,7 +213,7 @@ class Bench(Desk):
         self.do(Open(paper_start()), SetRequest("optimisation.request", request))
         self.push(START)
         self.wait(lambda s: s.optimisation.is_on and len(run_of(s).iterates) >= iterates)
-        process = process_id(self.optimiser.worker)
+        process = self.optimiser.worker.process_id
         assert process is not None
         return process
 

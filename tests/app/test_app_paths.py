@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from desk import Desk
 from services import StubDownloads, StubWorker, services_for
-from worker_process import process_id
 
 from explorer.app.features.feature import Services
 from explorer.app.features.loads.load import weights_of_parts
@@ -326,7 +325,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
     positions, rotations = ([p.position for p in inner], [p.rotation for p in inner])
     assert poses_are_valid(state.design, np.array(positions), np.array(rotations)).all()
-    process = process_id(bench.runner.worker)
+    process = bench.runner.worker.process_id
     assert process not in (None, os.getpid())
     # A plan that would never be ready.
     os.kill(process, signal.SIGSTOP)
@@ -564,7 +563,7 @@ def test_drives_of_the_path_are_requested_once_it_is_there_and_wanted() -> None:
 def test_drives_are_drawn_or_the_reason_is_told_in_a_sentence() -> None:
     wanted = Set("paths.drives", "duration").apply(with_ends(open_state(OPTIMAL), None, GOAL))
     html = drives_html(draw_drives(drives_request(Go().apply(wanted))))
-    assert "One motor for all six actuators needs at least" in html
+    assert "One motor for all six needs at least" in html
     # A line of each actuator in the three charts over time and in that of force and speed.
     assert html.count('<path d="M') == 24
     between = Set("paths.drives", "duration").apply(start_between(0, 3))

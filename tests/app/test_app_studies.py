@@ -17,7 +17,6 @@ import pytest
 from client import wait_for
 from desk import Desk
 from hypothesis import given, strategies as st
-from worker_process import process_id
 
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.features.feature import Services
@@ -716,7 +715,7 @@ def test_study_whose_process_dies_is_reported_and_keeps_what_is_finished(studio:
 
     # Once there is something to keep.
     wait_for(is_begun, PATIENCE)
-    number = process_id(studio.runner.worker)
+    number = studio.runner.worker.process_id
     assert number is not None
     os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
     assert studio.runner.wait_until_idle(PATIENCE)

@@ -15,7 +15,6 @@ from typing import Any
 
 import pytest
 from client import wait_for
-from worker_process import process_id
 
 from explorer.app.server import ALLOCATOR, LOG, start_log
 from explorer.app.session.worker import CANCELLED, DIED_TWICE, RESTARTED, Worker, log_error
@@ -103,12 +102,12 @@ def test_task_sends_messages_while_it_runs_and_ends_when_it_is_cancelled(
     requester.request("count_until_cancelled")
     # The task ends for no other reason, so this came before its end.
     assert requester.next() == ("message", 0)
-    process = process_id(worker)
+    process = worker.process_id
     worker.cancel(requester.number, NEVER)
     messages, end = requester.all()
     assert end == ("done", len(messages) + 1)
     requester.assert_works()
-    assert process_id(worker) == process
+    assert worker.process_id == process
     # One that is cancelled before it was begun ends at once.
     requester.request("count_until_cancelled")
     worker.cancel(requester.number, NEVER)
@@ -129,7 +128,7 @@ def test_next_task_is_neither_cancelled_nor_killed_with_the_last(
     worker.cancel(requester.number, NEVER)
     first = requester.number
     requester.all()
-    process = process_id(worker)
+    process = worker.process_id
     requester.request("count_until_cancelled")
     # The deadline of the first one passes now.
     worker.cancel(first, AT_ONCE)
@@ -137,7 +136,7 @@ def test_next_task_is_neither_cancelled_nor_killed_with_the_last(
         assert requester.next() == ("message", number)
     worker.cancel(requester.number, NEVER)
     assert requester.all()[1][0] == "done"
-    assert process_id(worker) == process
+    assert worker.process_id == process
 
 
 def test_task_that_does_not_end_when_cancelled_is_killed_without_a_report(
@@ -145,12 +144,12 @@ def test_task_that_does_not_end_when_cancelled_is_killed_without_a_report(
 ) -> None:
     requester.request("hang")
     assert requester.next() == ("message", 0)
-    process = process_id(worker)
+    process = worker.process_id
     worker.cancel(requester.number, AT_ONCE)
     assert requester.next() == ("failed", DIED_TWICE)
     assert not reports
     requester.assert_works()
-    assert process_id(worker) != process
+    assert worker.process_id != process
 
 
 def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
@@ -159,7 +158,7 @@ def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
     first, second, third = (Requester(worker) for _ in range(3))
     first.request("count_until_cancelled")
     assert first.next() == ("message", 0)
-    process = process_id(worker)
+    process = worker.process_id
     # Both wait for their turn.
     second.request("say", "still wanted", key="second", sends=False)
     third.request("say", "nobody asks any more", key="third", sends=False)
@@ -167,7 +166,7 @@ def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
     worker.cancel(first.number, NEVER)
     assert second.next() == ("done", "still wanted")
     assert third.next() == ("failed", DIED_TWICE)
-    assert process_id(worker) == process
+    assert worker.process_id == process
     assert not reports
 
 
@@ -176,7 +175,7 @@ def test_task_that_is_cancelled_after_some_time_makes_room_for_the_next(
 ) -> None:
     requester.request("count_until_cancelled")
     assert requester.next() == ("message", 0)
-    process = process_id(worker)
+    process = worker.process_id
     first = requester.number
     requester.request("count", 3)
     worker.cancel(first, after=0.05)
@@ -184,7 +183,7 @@ def test_task_that_is_cancelled_after_some_time_makes_room_for_the_next(
     # The first one ends for no other reason.
     assert end == ("done", len(messages) + 1)
     assert requester.all() == ([0, 1, 2], ("done", 3))
-    assert process_id(worker) == process
+    assert worker.process_id == process
     assert not reports
 
 
@@ -213,7 +212,7 @@ def test_task_that_refuses_or_kills_its_process_is_reported(
 def test_request_of_a_key_replaces_the_one_that_waits(requester: Requester, worker: Worker) -> None:
     requester.request("say", "first", sends=False)
     assert requester.next() == ("done", "first")
-    process = process_id(worker)
+    process = worker.process_id
     assert process not in (None, os.getpid())
     assert process is not None
     # Stopped, so that it is at the first of them while the others are posted.
@@ -235,14 +234,14 @@ def test_killed_worker_is_reported_and_started_again(
 ) -> None:
     requester.request("say", "first", sends=False)
     assert requester.next() == ("done", "first")
-    first = process_id(worker)
+    first = worker.process_id
     assert first is not None
     # Stopped, so that the kill hits it in the middle of its work, which is done all the same.
     os.kill(first, signal.SIGSTOP)
     requester.request("say", "again", sends=False)
     os.kill(first, signal.SIGKILL)
     assert requester.next() == ("done", "again")
-    second = process_id(worker)
+    second = worker.process_id
     assert second not in (None, first)
     assert second is not None
     # And once more, while it has nothing to do.
@@ -250,7 +249,7 @@ def test_killed_worker_is_reported_and_started_again(
     requester.request("say", "once more", sends=False)
     assert requester.next() == ("done", "once more")
     assert reports == [RESTARTED] * 2
-    assert process_id(worker) not in (None, first, second)
+    assert worker.process_id not in (None, first, second)
 
 
 def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
@@ -259,7 +258,7 @@ def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
     requester = Requester(worker)
     requester.request("hang")
     assert requester.next() == ("message", 0)
-    process = process_id(worker)
+    process = worker.process_id
     assert process is not None
     os.kill(process, signal.SIGSTOP)
     worker.stop()
@@ -276,7 +275,7 @@ from tests.app import telling
 worker = Worker(print)
 def receive(value):
     if value == 5:
-        print(worker._process.pid, flush=True)
+        print(worker.process_id, flush=True)
         os._exit(0)
 worker.submit("task", telling.count_until_cancelled, (), print, print, receive=receive)
 worker.wait_until_idle(600.0)

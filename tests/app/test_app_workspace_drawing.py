@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from desk import viewed
 from services import StubWorker, services_for
-from worker_process import process_id
 
 from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED, surface_of
@@ -79,7 +78,7 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     feed.follow(Frame(open_state(OPTIMAL)))
     assert worker.wait_until_idle(PATIENCE)
     # A hidden drawing is not requested.
-    assert process_id(worker) is None
+    assert worker.process_id is None
     assert feed.drawing is None
     state = with_solid(open_state(OPTIMAL))
     for i in range(25):

@@ -11,7 +11,6 @@ from likeness import decoded
 from playwright.sync_api import expect
 from server_clock import wait_until_drawn
 from tab import Tab
-from worker_process import process_id
 
 from explorer.app.features.mechanism.feature import JOINT_LABELS
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
@@ -56,7 +55,7 @@ def test_accessible_solid_replaces_the_other_while_the_page_stays_alive(tab: Tab
     tab.page.get_by_text("within the limits, in the present orientation").wait_for()
     await_drawing(tab)
     tab.wait_for(lambda: red_pixels(tab) < MANY, "the solid, without collisions")
-    process = process_id(page.worker)
+    process = page.worker.process_id
     assert process is not None
     # A worker that is never done: whatever happens now happens while it computes.
     os.kill(process, signal.SIGSTOP)

@@ -35,7 +35,7 @@ def test_drives_of_a_table_of_corners_and_their_csv_agree(cli: CommandLine, tmp_
         np.testing.assert_allclose(peak, found[f"peak_{name}"], rtol=0.01, atol=1e-3)
     way = np.trapezoid([row["l4 speed [mm/s]"] for row in rows], dx=rows[1]["time_s"])
     assert way == pytest.approx(rows[-1]["l4 [mm]"] - rows[0]["l4 [mm]"], abs=1e-3)
-    assert "One motor for all six actuators needs at least" in cli.text(*words)
+    assert "One motor for all six needs at least" in cli.text(*words)
 
 
 def test_drives_take_the_corners_of_a_planned_path_and_the_shortest_time_of_a_design(
@@ -67,7 +67,7 @@ def test_drives_take_the_corners_of_a_planned_path_and_the_shortest_time_of_a_de
         ([*MOVE, "--speed", "3", "--acceleration", "9", "--duration", "1"], "either --duration"),
         ([*MOVE, "--duration", "0"], "a positive number"),
         (["--to", "12", "40", "8", "--duration", "1"], "leaves the limits"),
-        ([*MOVE, "--path", "corners.csv"], "leave out --from and --to"),
+        ([*MOVE, "--path", "corners.csv"], "leave out --from, --to"),
     ],
 )
 def test_drives_refuse_what_is_no_path_in_time(

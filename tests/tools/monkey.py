@@ -28,7 +28,6 @@ from client import press_update, presses_in
 from page_props import differences, shown_by
 from server_clock import wait_until_drawn
 from socket_tab import SocketTab
-from worker_process import process_id
 
 from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
 from explorer.app.page import REFUSAL
@@ -311,7 +310,7 @@ class Monkey:
 
     def _kill(self) -> None:
         """Kill the worker that draws the workspace, whatever it is doing."""
-        number = process_id(self.running.page.worker)
+        number = self.running.page.worker.process_id
         # Twice over the same work it is given up.
         if number is not None and time.monotonic() - self._killed > KILL_SECONDS:
             self._killed = time.monotonic()

@@ -196,6 +196,12 @@ class Worker:
         if patience is not None and self._deadline is None:
             self._deadline = Timer(patience, self._kill, number)
 
+    @property
+    def process_id(self) -> int | None:
+        """Id of the child process; None if it has not been needed yet."""
+        process = self._process
+        return None if process is None else process.pid
+
     def start(self, then: Callable[[], None] = lambda: None) -> None:
         """Start the process before it is needed; `then` is called when it has started."""
         self.submit("start", do_nothing, (), lambda _: then(), lambda _: None)

@@ -263,9 +263,7 @@ class Drives(TimedOptions):
                 )
             return start, goal
         if goal is not None or start != design.home_pose:
-            raise InputError(
-                "--path has the ends of the path: leave out --from and --to, and their orientations"
-            )
+            raise InputError("--path has the ends: leave out --from, --to and their orientations")
         table = parse_table(str(self.path), read_at_most(self.path, MOST_BYTES), design.unit_mm)
         if "time" in table.columns:
             raise InputError(

@@ -27,7 +27,6 @@ _LOOKS = [
     {"stroke": css(_LEGS[leg]), "stroke_dasharray": "5 3" if d in (1, 3) else None, "fill": "none"}
     for d, leg in enumerate((0, 1, 1, 2, 2, 3))
 ]
-_LIMIT = {"stroke": "currentColor", "stroke_dasharray": "2 2.5", "fill": "none"}
 # Room beyond the values of an axis, as a share of their span.
 ROOM = 0.06
 
@@ -65,9 +64,10 @@ def force_speed_chart(drives: Drives) -> Element:
     boxes = np.unique(sides.reshape(4, 6), axis=1).T if np.isfinite(limits).any() else ()
     for x0, x1, y0, y1 in boxes:
         path = path_of(chart.place(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])))
-        pieces.append(element("path", d=path, **_LIMIT))
-    words = "Forces of the actuators against their speeds"
-    return _svg(LEGEND + ABOVE + TALL + BELOW, words, pieces)
+        look = {"stroke": "currentColor", "stroke_dasharray": "2 2.5", "fill": "none"}
+        pieces.append(element("path", d=path, **look))
+    title = "Forces of the actuators against their speeds"
+    return _svg(LEGEND + ABOVE + TALL + BELOW, title, pieces)
 
 
 def _svg(height: float, title: str, pieces: Iterable[Element]) -> Element:
@@ -120,10 +120,9 @@ class _Chart(NamedTuple):
         def words(value: float) -> str:
             return format_number(value, 5) if name else ""
 
-        scale = width / x
         yield drawing_text(title, 4.0, top - 8.0, "axis")
         yield ruler(
-            name, self.across, left, scale, across=bottom, up=False, grid=height, words=words
+            name, self.across, left, width / x, across=bottom, up=False, grid=height, words=words
         )
         yield ruler("", self.up, bottom, height / y, across=left, up=True, grid=width)
         for curve, look in zip(curves, _LOOKS, strict=True):

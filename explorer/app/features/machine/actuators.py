@@ -142,7 +142,7 @@ STIFF = Quantity(
 
 # Those that are None while a switch is off, with its words.
 SWITCHED = (
-    (CONTINUOUS, "Limited continuous force", "Limit the force that the actuators hold permanently."),
+    (CONTINUOUS, "Limited continuous force", "Limit the force that actuators hold permanently."),
     (SPEED, "Limited speed", "Limit the speeds of the actuators."),
     (ACCELERATION, "Limited acceleration", "Limit the accelerations of the actuators."),
     (STIFF, "Elastic", "Give the actuators a stiffness; off, they are rigid."),
