@@ -23,7 +23,6 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.crossings import path_margins
 from explorer.paths.time_law import (
     SINGULAR,
     JointMotion,
@@ -194,6 +193,8 @@ def drives_along(design: Design, path: TimedPath) -> Drives:
     check_limits(design, moves)
     # With a limit of the margins no path within the limits is singular.
     if design.limits.margin is None:
+        from explorer.paths.crossings import path_margins
+
         singular = path_margins(path.poses, path.tool)
         if singular.crossings or singular.lies_in:
             raise NoAnswerError(SINGULAR)
