@@ -18,7 +18,6 @@ from explorer.numerics.arrays import FloatArray, dot, rotate
 from explorer.statics.weights import motion_array
 
 IS_ON_GUIDE = np.array([False, True, True, False])
-"""Whether the carriage of each leg slides along the guide."""
 
 
 def joint_rates(

@@ -111,8 +111,7 @@ class Paths:
         kind: Kind of the next path.
         seconds: Longest time of planning, in seconds.
         holds_load: Whether a planned path holds the load of the page all along.
-        drives: Whether speeds and forces of the actuators are computed, in the shortest time or a
-            given one.
+        drives: Time law for which speeds and forces of the actuators are computed, or off.
         duration: The given time, in seconds.
         request: Number of the last request to plan; 0 before the first.
         planning: Start and goal of the path that is being planned; None if none is.

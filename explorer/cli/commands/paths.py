@@ -258,9 +258,7 @@ class Drives(TimedOptions):
         start, goal = self.ends(design)
         if self.path is None:
             if goal is None:
-                raise InputError(
-                    f"give the path with --path, or say where it ends {options.END_OPTIONS}"
-                )
+                raise InputError(f"give --path, or say where the path ends {options.END_OPTIONS}")
             return start, goal
         if goal is not None or start != design.home_pose:
             raise InputError("--path has the ends: leave out --from, --to and their orientations")
