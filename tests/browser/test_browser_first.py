@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import closing
 
 from playwright.sync_api import Browser, expect
 from tab import Tab
 
+from explorer.app.features.paths.actions import Go
 from explorer.app.server import Running
+from explorer.app.state.actions import Set
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 
 STOPS = """() => [...document.querySelectorAll("a[href], button, input, [tabindex]")]
     .filter((each) => each.tabIndex >= 0 && !each.disabled && each.getClientRects().length)
@@ -32,6 +37,7 @@ COVERED = """() => {
 }"""
 # Windows of a small laptop, half a screen, and a phone, with the figures that they show at least.
 WINDOWS = {(1000, 700): 3, (820, 600): 2, (390, 844): 1}
+HIGHER = Pose((10.0, 5.0, 11.0), PRESETS["paper-optimal"].home_pose.quaternion)
 
 
 def test_first_screen_is_short_for_the_keyboard_and_stays_as_it_was_opened(
@@ -75,3 +81,24 @@ def test_bar_of_any_window_shows_the_verdict_and_cuts_no_figure(
             expect(tab.page.locator("[data-document]")).to_be_in_viewport(ratio=1.0)
         # On a phone, the last of the windows, the panels are below the scene.
         tab.wait_for(lambda: not tab.page.evaluate(COVERED), "a scene that no panel covers")
+
+
+def test_charts_of_a_path_are_no_wider_than_a_phone(browser: Browser, running: Running) -> None:
+    phone = min(WINDOWS)
+    for path, value in (
+        ("design.actuators.speed_mm_s", (200.0,) * 6),
+        ("paths.goal", HIGHER),
+        ("paths.drives", "duration"),
+    ):
+        running.page.session.do(Set(path, value))
+    running.page.session.do(Go())
+    with closing(Tab(browser, running)) as tab:
+        tab.resize(phone)
+        tab.page.get_by_text(re.compile("^Optimise · ")).click()
+        tab.page.get_by_role("tab", name="Paths").click()
+        charts = tab.page.locator(".uplot:visible")
+        expect(charts).not_to_have_count(0)
+        expect(tab.page.locator(".ex-drives")).to_be_visible()
+        tab.settle()
+        boxes = [chart.bounding_box() for chart in charts.all()]
+        assert all(box and box["width"] < phone[0] for box in boxes), boxes
