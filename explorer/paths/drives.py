@@ -37,8 +37,8 @@ from explorer.workspace.limits.valid_poses import violations
 
 # Share of a limit from which it counts as exceeded, rather than used up to rounding.
 BEYOND = 1.0 + 1e-6
-# Limits of an actuator of which a motion uses shares this close together all bind.
-CLOSE = 1e-3
+# Share of a limit from which it binds.
+BINDING = 1.0 - 1e-3
 # Parts of an interval, and their weights in its mean by Simpson's rule. The end stays within it.
 PARTS, WEIGHTS = (0.0, 0.5, 1.0 - 1e-9), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
@@ -63,7 +63,7 @@ class TimedPath(NamedTuple):
 
 
 class Binding(NamedTuple):
-    """A limit of an actuator of which a motion uses the largest share.
+    """A limit of an actuator that a motion uses up, or else the one of which it uses the most.
 
     Attributes:
         limit: Its name.
@@ -159,7 +159,7 @@ class Drives:
 
     @cached_property
     def binding(self) -> tuple[tuple[Binding, ...], ...]:
-        """For each actuator the limits of which it uses the most; none for one without limits."""
+        """The limits that bind of each actuator, or the nearest to it; none without limits."""
         limits, (push, pull) = self.design.actuators, self.design.actuators.limits
         shares = {
             "speed": np.abs(self.speed) / or_infinite(limits.speed_mm_s),
@@ -173,7 +173,7 @@ class Drives:
             largest = max(each[:, joint].max() for each in shares.values())
             for name, each in shares.items():
                 used = each[:, joint]
-                if used.max() >= (1.0 - CLOSE) * largest > 0.0:
+                if used.max() >= min(largest, BINDING) > 0.0:
                     time = float(self.time[used.argmax()]) if len(used) > 1 else None
                     yield Binding(name, float(used.max()), time)
 
@@ -251,15 +251,14 @@ def drive_blocks(drives: Drives) -> Iterator[block.Block]:
             *((block.Names("most used limit", used),) if any(drives.binding) else ()),
         ),
         "Mean power is the mean of its size: a brake's power counts too.",
-        ["beyond" if each and each[0].share > BEYOND else None for each in drives.binding],
+        ["beyond" if any(b.share > BEYOND for b in each) else None for each in drives.binding],
     )
 
 
 def _binding_words(binding: Sequence[Binding]) -> block.Words:
-    if not binding:
-        return "no limit"
-    share = binding[0].share if binding[0].share > BEYOND else min(binding[0].share, 1.0)
-    limits = (
-        each.limit + ("" if each.time is None else f" at {each.time:.3f} s") for each in binding
-    )
-    return block.Share(share), " of " + ", ".join(limits)
+    words: list[str | block.Number | block.Share] = []
+    for limit, used, time in binding:
+        share = used if used > BEYOND else min(used, 1.0)
+        at = "" if time is None else f" at {time:.3f} s"
+        words += [", "] * bool(words) + [block.Share(share), f" of {limit}{at}"]
+    return tuple(words) or "no limit"

@@ -117,27 +117,26 @@ def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
     assert_allclose(found.power.sum(axis=1), power, atol=1e-3 * np.abs(power).max())
 
 
-def test_binding_limits_are_those_of_the_largest_share_with_its_time() -> None:
+def test_binding_limits_are_those_used_up_or_else_the_one_used_the_most() -> None:
     path = random_path(2)
     law = law_of_duration(path, 0.3)
     found = drives_of(OPTIMAL, path, law)
     assert found.binding == ((),) * 6
     summary = found.summary
-    pull = summary.peak_force * [2.0, 2.0, 2.0, 2.0, 2.0, 0.8]
+    shares = [1.5, 1.0, 1.0, 1.0, 1.25, 0.6]
     limits = Actuators(
-        speed_mm_s=six(0.8 * summary.peak_speed),
+        speed_mm_s=six(summary.peak_speed * [0.8, 0.8, 0.8, 0.8, 0.8, 2.0]),
         push_n=six(2.0 * summary.peak_force),
-        pull_n=six(np.minimum(pull, 2.0 * summary.peak_force)),
-        continuous_n=six(summary.rms_force / [1.5, 1.0, 1.0, 1.0, 1.25, 1.0]),
+        continuous_n=six(summary.rms_force / shares),
     )
     limited = drives_of(msgspec.structs.replace(OPTIMAL, actuators=limits), path, law)
-    assert limited.binding[0] == (("continuous force", pytest.approx(1.5), None),)
-    assert [each.limit for each in limited.binding[4]] == ["speed", "continuous force"]
-    for joint, each in enumerate(limited.binding[1:4], 1):
-        (binding,) = each
-        assert (binding.limit, binding.share) == ("speed", pytest.approx(1.25))
-        speed = np.interp(binding.time or 0.0, found.time, np.abs(found.speed[:, joint]))
-        assert speed == pytest.approx(summary.peak_speed[joint])
+    for joint, (*others, last) in enumerate(limited.binding):
+        assert last == ("continuous force", pytest.approx(shares[joint]), None)
+        assert len(others) == (1 if joint < 5 else 0)
+        for limit, share, time in others:
+            assert (limit, share) == ("speed", pytest.approx(1.25))
+            speed = np.interp(time or 0.0, found.time, np.abs(found.speed[:, joint]))
+            assert speed == pytest.approx(summary.peak_speed[joint])
 
 
 def test_path_through_a_singular_pose_between_its_samples_is_refused() -> None:
