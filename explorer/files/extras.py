@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 import sys
+import warnings
 from importlib.util import find_spec
 from typing import Any
 
@@ -58,6 +59,7 @@ def load_extra(extra: str, *modules: str) -> list[Any]:
         MissingExtraError: One is not installed; the message says how to install it.
     """
     try:
-        return [importlib.import_module(name) for name in modules]
+        with warnings.catch_warnings(action="ignore"):  # Python's about the sources of toppra.
+            return [importlib.import_module(name) for name in modules]
     except ImportError:
         raise MissingExtraError(need_of(extra)) from None

@@ -216,8 +216,7 @@ def law_at_speed(
 def law_of_shortest_time(design: Design, moves: StraightMoves, bodies: MovingBodies) -> TimeLaw:
     """Return the law of the shortest time within speeds, accelerations and forces of the actuators.
 
-    Needs the extra `timing`. The forces hold and accelerate bodies. A finer grid would mostly give
-    a time shorter by less than 1 %.
+    Needs the extra `timing`. The forces hold and accelerate bodies.
 
     Raises:
         InputError: The path has no length, or no limit bounds the acceleration.
