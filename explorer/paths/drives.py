@@ -169,7 +169,7 @@ class Drives:
             "continuous force": self.summary.rms_force[None] / or_infinite(limits.continuous_n),
         }
 
-        def most_used(joint: int) -> Iterator[Binding]:
+        def limits_of(joint: int) -> Iterator[Binding]:
             largest = max(each[:, joint].max() for each in shares.values())
             for name, each in shares.items():
                 used = each[:, joint]
@@ -177,7 +177,7 @@ class Drives:
                     time = float(self.time[used.argmax()]) if len(used) > 1 else None
                     yield Binding(name, float(used.max()), time)
 
-        return tuple(tuple(most_used(joint)) for joint in range(6))
+        return tuple(tuple(limits_of(joint)) for joint in range(6))
 
 
 def drives_along(design: Design, path: TimedPath) -> Drives:
