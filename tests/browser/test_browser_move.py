@@ -140,6 +140,27 @@ def test_row_of_a_mode_shows_its_ghost_while_it_is_pointed_at_and_is_chosen(tab:
     tab.wait_for(lambda: tab.state.mode == 2, "the mode of the row with the focus")
 
 
+def test_row_with_the_focus_keeps_its_ghost_until_the_pointer_moves(tab: Tab) -> None:
+    hovered = tab.running.page.services.get(mode_hover)
+    tab.unfold("8 modes")
+    row_of_mode(tab, 6).scroll_into_view_if_needed()
+    row_of_mode(tab, 6).hover()
+    tab.wait_for(lambda: hovered.row == 6, "the ghost of the row under the pointer")
+    tab.page.get_by_role("button", name="Other modes as ghosts").focus()
+    for _ in range(3):
+        tab.page.keyboard.press("Tab")
+    tab.wait_for(lambda: hovered.row == 2, "the ghost of the row with the focus")
+    # As a change of layout does under a pointer that rests, once beside a row and once on it.
+    for place in (tab.page.get_by_role("button", name="Home pose"), row_of_mode(tab, 6)):
+        place.dispatch_event("pointerover")
+        tab.settle()
+        assert hovered.row == 2
+    row_of_mode(tab, 4).hover()
+    tab.wait_for(lambda: hovered.row == 4, "the ghost of the row that the pointer moved to")
+    tab.page.mouse.move(SIZE[0] // 2, 4)
+    tab.wait_for(lambda: hovered.row == 2, "the ghost of the row that has kept the focus")
+
+
 def row_of_mode(tab: Tab, mode: int) -> Locator:
     return tab.page.get_by_role("button", name=f"Mode {mode}, ")
 

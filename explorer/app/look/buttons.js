@@ -62,34 +62,55 @@ window.explorer.buttons ??= (() => {
     [...document.querySelectorAll(`[data-hover="${name}"]`)].some(
       (element) => element.dataset.value === value,
     );
-  let hovered = null;
+  // What the pointer and the keyboard rest on; what was moved last is reported. A change of layout
+  // under a resting pointer fires pointerover too, which moves nothing.
+  const rested = { pointer: null, keyboard: null };
+  let moved = "pointer";
   let reported = null;
   let timer = null;
-  const reportHovered = () => {
+  const reportRested = () => {
     timer = null;
+    const hovered = rested[moved] ?? rested.keyboard ?? rested.pointer;
     if (hovered?.name === reported?.name && hovered?.value === reported?.value) return;
     if (reported && reported.name !== hovered?.name) window.explorer.press(reported.name, "");
     if (hovered) window.explorer.press(hovered.name, hovered.value);
     reported = hovered;
   };
-  const hover = (element) => {
-    hovered = element ? { name: element.dataset.hover, value: element.dataset.value ?? "" } : null;
-    timer ??= window.explorer.clock.after(HOVER_PAUSE, reportHovered);
+  const restOn = (device, element) => {
+    rested[device] = element
+      ? { name: element.dataset.hover, value: element.dataset.value ?? "" }
+      : null;
+    timer ??= window.explorer.clock.after(HOVER_PAUSE, reportRested);
   };
-  const hoverAt = (target) => hover(target?.closest?.("[data-hover]"));
-  addEventListener("pointerover", ({ target }) => hoverAt(target));
+  const pointAt = (target) => restOn("pointer", target?.closest?.("[data-hover]"));
+  addEventListener("pointerover", ({ target }) => pointAt(target));
   // The pointer has left the window, or a finger the screen.
   addEventListener("pointerout", ({ relatedTarget }) => {
-    if (!relatedTarget) hover(null);
+    if (!relatedTarget) pointAt(null);
   });
+  for (const type of ["pointermove", "pointerdown"]) {
+    addEventListener(
+      type,
+      ({ target }) => {
+        if (moved === "pointer") return;
+        moved = "pointer";
+        pointAt(target);
+      },
+      true,
+    );
+  }
   addEventListener("focusin", ({ target }) => {
-    if (target.matches?.("[data-hover]:focus-visible")) hover(target);
+    if (!target.matches?.("[data-hover]:focus-visible")) return;
+    moved = "keyboard";
+    restOn("keyboard", target);
   });
   addEventListener("focusout", ({ target }) => {
-    if (target.matches?.("[data-hover]")) hover(null);
+    if (target.matches?.("[data-hover]")) restOn("keyboard", null);
   });
-  const dropHovered = () => {
-    if (hovered && !isThere(hovered)) hover(null);
+  const dropRested = () => {
+    for (const device of ["pointer", "keyboard"]) {
+      if (rested[device] && !isThere(rested[device])) restOn(device, null);
+    }
   };
   const keepFocus = () => {
     if (!focused || focused.isConnected || document.activeElement !== document.body) return;
@@ -98,7 +119,7 @@ window.explorer.buttons ??= (() => {
   };
   const followMarkup = () => {
     keepFocus();
-    dropHovered();
+    dropRested();
   };
   new MutationObserver(followMarkup).observe(document.body, { childList: true, subtree: true });
   return (uuid) => {
