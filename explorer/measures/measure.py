@@ -53,8 +53,8 @@ def longest_leg(design: Design) -> float:
 class Case:
     """A design to measure; lengths in design units.
 
-    All values describe the constant-orientation workspace. Each intermediate result is computed
-    when a measure first needs it.
+    All values describe the constant-orientation workspace, except for those at home. Each
+    intermediate result is computed when a measure first needs it.
 
     Attributes:
         design: The manipulator.
@@ -112,8 +112,9 @@ class Case:
 
     @cached_property
     def home_indices(self) -> PoseIndices:
-        """The indices of conditioning, manipulability and transmission at the case's pose."""
-        return PoseIndices(self.design, self.at.position, self.rotation)
+        """The indices of conditioning, manipulability and transmission in the home pose."""
+        home = self.design.home_pose
+        return PoseIndices(self.design, home.position, home.rotation)
 
     @cached_property
     def node_indices(self) -> PoseIndices:
@@ -183,9 +184,9 @@ class Case:
 
     @cached_property
     def home_statics(self) -> BoxStatics:
-        """Loads, errors and compliance at the position of the case's pose."""
-        position = self.at.position
-        return BoxStatics(self.design, (position, position), self.rotation)
+        """Loads, errors and compliance in the home pose."""
+        home = self.design.home_pose
+        return BoxStatics(self.design, (home.position, home.position), home.rotation)
 
     @cached_property
     def carried_region(self) -> CarriedRegion:

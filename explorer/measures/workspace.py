@@ -16,7 +16,7 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.box import box_margins, box_nodes
 from explorer.measures.measure import Case, Measure, Sense, longest_leg
-from explorer.mechanism.design import LENGTHS, VARIABLES
+from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.margins import MARGIN_KINDS, margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
@@ -97,9 +97,25 @@ def _of_paper_nodes(attribute: Literal["count", "volume", "step"]) -> Callable[[
     return value
 
 
-def _least_tilt(case: Case, positions: FloatArray) -> float:
-    torsion = tilt_torsion_of(case.rotation).torsion
-    return float(np.nan_to_num(greatest_tilts(case.design, positions, torsion)).min())
+def _home_margin(case: Case) -> float:
+    home = case.design.home_pose
+    return float(np.abs(margins(home.position, home.rotation)).min())
+
+
+def _least_tilt(design: Design, positions: FloatArray, rotation: FloatArray) -> float:
+    torsion = tilt_torsion_of(rotation).torsion
+    return float(np.nan_to_num(greatest_tilts(design, positions, torsion)).min())
+
+
+def _home_tilt(case: Case) -> float:
+    home = case.design.home_pose
+    return _least_tilt(case.design, np.array(home.position), home.rotation)
+
+
+def _box_tilt(case: Case) -> float:
+    if case.box is None:
+        return math.nan
+    return _least_tilt(case.design, box_nodes(case.box), case.rotation)
 
 
 def _sizes() -> Iterable[Measure]:
@@ -217,7 +233,7 @@ def _margins() -> Iterable[Measure]:
         "home_margin",
         "margin at home",
         f"The smallest |δ| in the home pose. {MARGIN_KINDS}",
-        lambda case: float(np.abs(margins(case.at.position, case.rotation)).min()),
+        _home_margin,
         places=("compare",),
     )
     yield Margin(
@@ -358,7 +374,7 @@ def _orientations() -> Iterable[Measure]:
         "orientation_share",
         "orientation share at home",
         "Share of all orientations that the home position can have within the limits",
-        lambda case: orientation_share(case.design, case.at.position).share,
+        lambda case: orientation_share(case.design, case.design.home_pose.position).share,
         unit="share",
         places=("compare", "optimise", "studies", "report"),
     )
@@ -367,7 +383,7 @@ def _orientations() -> Iterable[Measure]:
         "tilt at home",
         "Greatest tilt in every azimuth at the home position, from tilt zero at home's torsion; 0 "
         "if tilt zero violates a limit",
-        lambda case: _least_tilt(case, np.array(case.at.position)),
+        _home_tilt,
         unit="°",
         places=("compare", "optimise", "studies", "report"),
     )
@@ -376,7 +392,7 @@ def _orientations() -> Iterable[Measure]:
         "tilt over the box",
         "Least of the greatest tilts in every azimuth at the nodes of a grid over the required "
         "box; 0 if tilt zero violates a limit at one",
-        lambda case: math.nan if case.box is None else _least_tilt(case, box_nodes(case.box)),
+        _box_tilt,
         unit="°",
         needs=("box",),
         places=("optimise",),
@@ -388,8 +404,8 @@ def coordinates() -> Iterable[Measure]:
     yield Measure(
         "yaw",
         "yaw of home",
-        "Yaw of the orientation that the workspace has",
-        lambda case: float(yaw_pitch_roll_from_rotation(case.rotation)[0]),
+        "Yaw of the orientation that the home pose has",
+        lambda case: float(yaw_pitch_roll_from_rotation(case.design.home_pose.rotation)[0]),
         unit="°",
         places=("compare", "optimise"),
     )

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from limited_designs import ordinary_case
+from machines import FULL
 from report_page import Node, read, table_of
 
 import explorer
@@ -17,6 +18,8 @@ from explorer.app.features.sharing.reporting import make_report
 from explorer.export.pose_tables import parse_table, read_poses
 from explorer.export.report.data import ReportData
 from explorer.export.report.workspace import worst_payload_force
+from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in
+from explorer.measures.measure import Case
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
 from explorer.paths.drives import TimedPath, drives_along
@@ -116,6 +119,16 @@ def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
             assert f" {k + 2}" in parts[place + k].text
     worst = worst_payload_force(ReportData(design))
     assert worst.share == pytest.approx(float(shares.max()), rel=1e-9)
+
+
+def test_report_of_a_pose_tells_at_home_what_home_has() -> None:
+    names = [name for name in measures_in("report") if "home" in CATALOGUE[name].label]
+    measured = measure_design(Case(FULL), names).values
+    headline = page_of(FULL, POSE).one(**{"class": "headline"})
+    told = {next(each.all("dt")).text.lower(): each.values for each in headline.all("div")}
+    assert {"home_tilt", "orientation_share", "home_load_share"} < {*measured}
+    for name, value in measured.items():
+        assert told[CATALOGUE[name].heading.lower()] == pytest.approx([value], rel=1e-12), name
 
 
 def test_report_loads_volume_is_that_of_held_workspace_beside_the_whole() -> None:

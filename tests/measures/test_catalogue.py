@@ -37,18 +37,23 @@ def compared(design: Design) -> Measurements:
     return measure_design(Case(design), measures_in("compare"))
 
 
-def test_measures_at_a_pose_are_of_its_orientation() -> None:
+def test_measures_at_a_pose_are_of_its_orientation_but_those_of_home_are_not() -> None:
     pose = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 5.0, 2.0))
     box = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
     statics = ("load_share", "largest_payload", "worst_error", "deflection")
-    names = [*measures_in("compare"), "worst_margin", "accessible_volume", *statics]
+    compare, report = measures_in("compare"), measures_in("report")
+    names = dict.fromkeys((*compare, *report, "worst_margin", "accessible_volume", *statics))
+    of_home = [name for name in names if "home" in CATALOGUE[name].label]
+    assert {"orientation_share", "home_tilt", "home_load_share", "yaw"} < {*of_home}
     turned = msgspec.structs.replace(PRECISE, home=pose)
     assert turned.home_pose == pose
     at_pose = measure_design(Case(PRECISE, pose=pose, box=box), names)
     assert at_pose["volume"] == workspace_volume(PRECISE, pose.rotation).volume
-    own = measure_design(Case(turned, box=box), [n for n in names if n != "accessible_volume"])
-    assert own.values == {name: at_pose[name] for name in own.values}
-    at_home = measure_design(Case(PRECISE, box=box), statics)
+    elsewhere = [name for name in names if name not in (*of_home, "accessible_volume")]
+    own = measure_design(Case(turned, box=box), elsewhere)
+    assert own.values == pytest.approx({name: at_pose[name] for name in own.values}, rel=1e-12)
+    at_home = measure_design(Case(PRECISE, box=box), (*of_home, *statics))
+    assert all(at_home[name] == pytest.approx(at_pose[name], rel=1e-12) for name in of_home)
     assert all(at_home[name] != at_pose[name] for name in statics)
 
 
