@@ -2,8 +2,9 @@
 
 A heading is a name with a unit, such as `x_mm`, `x [mm]`, `x [10 mm]` or `yaw_deg`. Without a unit
 a length is in design units and an angle in degrees. Columns with other names are ignored, so that
-a trajectory and the answers of this module are tables too. Spreadsheets of some countries separate
-columns by semicolons, with decimal commas; these are read as well.
+a trajectory and the answers of this module are tables too. What spreadsheets of any country write
+is read: columns separated by commas, semicolons or tabs, the latter two also with decimal commas,
+and a first line such as `sep=;`, which names the separator.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.export.tables import length_heads
+from explorer.files.json_text import decode_text
 from explorer.mechanism import kinematics
 from explorer.mechanism.configuration import Configuration, Point, offset_of
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
@@ -87,7 +89,7 @@ class Table:
         headings: Headings of all columns, known or not.
         columns: Known columns by their names, without units.
         rows: Number of the line in the file, and cells, of each line that is not blank.
-        decimal: The decimal sign of numbers, a point or a comma.
+        decimal: The decimal sign of all numbers, a point or a comma.
     """
 
     file: str
@@ -122,10 +124,12 @@ class Table:
             )
         columns = [self.columns[name] for name in names]
         values = np.empty((len(self.rows), len(names)))
+        # The other sign separates thousands, so that a cell with it is no plain number.
+        signs = str.maketrans(",.", ".,") if self.decimal == "," else {}
         for index, (_, cells) in enumerate(self.rows):
             for k, (place, _, factor) in enumerate(columns):
                 try:
-                    value = factor * float(cells[place].replace(self.decimal, "."))
+                    value = factor * float(cells[place].translate(signs))
                 except ValueError:
                     self.refuse(index, names[k], f"a number, such as 12{self.decimal}5, is needed")
                 if problem := size_problem(value, most=STIFFEST):
@@ -149,23 +153,25 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
 
     Args:
         file: Name of the file, for messages.
-        data: Contents: UTF-8, with or without a byte order mark, or Windows-1252.
+        data: Contents: UTF-8 or UTF-16, with or without a byte order mark, or Windows-1252.
         unit_mm: Millimetres in the design unit of the table's numbers.
 
     Raises:
         InputError: The file is no table, or a heading has a wrong unit or appears twice.
     """
     try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("cp1252", errors="replace")
+        text = decode_text(data, "cp1252")
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
     first = next((line for line in text.splitlines() if line.strip(" ;,\t")), "")
-    separator = next((sign for sign in ";\t" if sign in first), ",")
+    named = re.match('"?sep=([;,|\t])', first)
+    separator = named[1] if named else next((sign for sign in ";\t" if sign in first), ",")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
     try:
         rows = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
     except csv.Error as error:
         raise InputError(f"{file}, line {reader.line_num}: this is no CSV: {error}") from None
+    rows = rows[1:] if named else rows
     if not 2 <= len(rows) <= MOST_LINES + 1:
         raise InputError(
             f"{file} needs a line of headings, such as x_mm, and 1 to {MOST_LINES} lines of "
@@ -192,7 +198,9 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
                 "decimal points, or semicolons separate the columns"
             )
         cells.extend([""] * (width - len(cells)))
-    return Table(file, headings, columns, rows[1:], "," if separator == ";" else ".")
+    places = [column.place for column in columns.values()]
+    has_comma = separator != "," and any("," in cells[k] for _, cells in rows[1:] for k in places)
+    return Table(file, headings, columns, rows[1:], "," if has_comma else ".")
 
 
 def _factor(match: re.Match[str], unit_mm: float) -> float | None:

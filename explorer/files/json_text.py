@@ -70,17 +70,21 @@ def decode_strictly(data: bytes, kind: type[T], source: str) -> T:
         return value
 
 
-def decode_text(data: bytes) -> str:
-    """Return the text of JSON in UTF-8, UTF-16 or UTF-32, without its byte order mark.
+def decode_text(data: bytes, other: str = "") -> str:
+    """Return the text of a file in UTF-8, UTF-16 or UTF-32, without its byte order mark.
+
+    Another encoding, if one is named, is that of bytes which are no UTF-8.
 
     Raises:
         InputError: The bytes are none of these, or there are none.
     """
-    # JSON begins with ASCII, in which the place of zeros shows the encoding.
+    # JSON and tables begin with ASCII, in which the place of zeros shows the encoding.
     encoding = json.detect_encoding(data)
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
+        if other and encoding.startswith("utf-8"):
+            return data.decode(other, "replace")
         line = _line_of(data[: error.start].decode(encoding, "ignore"))
         raise InputError(
             f"line {line}: the bytes are no text in {encoding.upper()}; save the file as UTF-8"

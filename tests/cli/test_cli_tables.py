@@ -38,15 +38,20 @@ def rows_of(answer: tables.TableAnswer) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(answer.csv)))
 
 
-def answer_to(text: str, design: explorer.Design = PRESET) -> tables.TableAnswer:
-    table = tables.parse_table("poses.csv", text.encode(), design.unit_mm)
+def answer_to(
+    text: str, design: explorer.Design = PRESET, encoding: str = "utf-8"
+) -> tables.TableAnswer:
+    table = tables.parse_table("poses.csv", text.encode(encoding), design.unit_mm)
     return tables.inverse_answer(table, tables.read_poses(table, design, HOME.rotation))
 
 
-@pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ","), ("\t", ".")])
-@pytest.mark.parametrize("start", ["", "\ufeff"])
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ",")]
+)
+@pytest.mark.parametrize("start", ["", "sep="])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le"])
 def test_poses_of_any_dialect_come_back_through_their_joints(
-    separator: str, decimal: str, start: str
+    separator: str, decimal: str, start: str, encoding: str
 ) -> None:
     position, angles = random_poses(60)
     units = np.array([10.0, 1.0, 0.01, 1.0, 1.0, np.pi / 180.0])
@@ -55,8 +60,9 @@ def test_poses_of_any_dialect_come_back_through_their_joints(
         separator.join(["ä", *(repr(value).replace(".", decimal) for value in row)])
         for row in (np.hstack([position, angles]) * units).tolist()
     ]
-    text = start + f"\n{separator * 6}\n".join([head, *lines])
-    there = answer_to(text)
+    text = f"\n{separator * 6}\n".join([f"{start}{separator}"] * bool(start) + [head, *lines])
+    there = answer_to(text, encoding=encoding)
+    assert rows_of(there)[0]["line"] == ("5" if start else "3")
     rotation = rotation_from_yaw_pitch_roll(angles)
     at = Configuration(PRESET, position, rotation)
     table = tables.parse_table("joints.csv", there.csv.encode(), PRESET.unit_mm)
@@ -156,6 +162,7 @@ FAULTS = """
 x_mm,y_mm,z_mm/1,2,3/1,two,3 | line 3, column y_mm: 'two': a number, such as 12.5, is needed
 x_mm;y;z/1;2,5;3/1;2.5.1;3 | line 3, column y: '2.5.1': a number, such as 12,5, is needed
 x,y,z/1,2,3//1,,3 | line 4, column y: ''
+x;y;z/1,5;2,5;3.5 | line 2, column z: '3.5': a number, such as 12,5, is needed
 x,y,z/1,nan,3 | column y: 'nan': this must be a finite number
 x,y,z/1,2,1e300 | column z: '1e300': this must not exceed 1e+12
 x,y,z/1,5,2,3 | line 2 has 4 cells below 3 headings
@@ -180,6 +187,11 @@ def test_faults_are_told_with_line_and_column(case: str) -> None:
         answer_to(text.replace("/", "\n"))
     assert words in str(caught.value)
     assert str(caught.value).startswith("poses.csv")
+
+
+def test_truncated_utf16_is_refused_in_one_sentence() -> None:
+    with pytest.raises(InputError, match=r"poses.csv: line 2: the bytes are no text in UTF-16; "):
+        tables.parse_table("poses.csv", "x,y,z\n1,2,3".encode("utf-16")[:-1], 1.0)
 
 
 def test_options_of_tables_are_refused_without_one(cli: CommandLine, tmp_path: Path) -> None:
