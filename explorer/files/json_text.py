@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import json
+import math
 import re
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping
@@ -47,6 +48,8 @@ _TYPES = {
     "null": "null",
 }
 _TYPE_OF_LETTER = {'"': "str", "[": "array", "{": "object", "n": "null", "t": "bool", "f": "bool"}
+# What msgspec says of a number with a power of ten beyond those of floats.
+_TOO_LARGE = "Number out of range"
 
 
 class _Place(NamedTuple):
@@ -181,7 +184,10 @@ def _words_of_syntax(fault: msgspec.DecodeError, text: str) -> str:
 
 def _first_places(text: str) -> dict[_Path, _Place]:
     """Return the first place of each value in a text, by its path."""
-    return dict(reversed([*_places(text)]))
+    places: dict[_Path, _Place] = {}
+    for path, place in _places(text):
+        places.setdefault(path, place)
+    return places
 
 
 def _words_of_refusal(fault: msgspec.ValidationError, text: str, kind: Any) -> str:
@@ -204,6 +210,8 @@ def _words_of_refusal(fault: msgspec.ValidationError, text: str, kind: Any) -> s
         words = f"the field `{missing[1]}`{_path_text(path, ' of ')} is missing"
     else:
         path = _matching(places, path, words)
+        if words == _TOO_LARGE and path in places:
+            words = f"expected a finite number, got {places[path].mark[:_LONGEST_QUOTE]}"
         allowed = _allowed_at(kind, path) if words.startswith("Invalid enum value") else []
         words = re.sub(r"`([a-z]+(?: \| [a-z]+)*)`", _types_in_words, words)
         words = words.replace("Expected", "expected")
@@ -287,7 +295,9 @@ def _matching(places: Mapping[_Path, _Place], path: _Path, words: str) -> _Path:
 
 
 def _is_refused(place: _Place, length: int, words: str) -> bool:
-    """Return whether msgspec's words fit a value: its type, or the length of a list."""
+    """Return whether msgspec's words fit a value: its type, its size, or the length of a list."""
+    if words == _TOO_LARGE:
+        return _TYPE_OF_LETTER.get(place.mark[0]) is None and math.isinf(float(place.mark))
     got = re.search(r"got `([a-z]+)`$", words)
     if got is not None:
         own = _TYPE_OF_LETTER.get(place.mark[0], "number")

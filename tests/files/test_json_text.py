@@ -167,6 +167,28 @@ def test_value_of_wrong_type_is_named_with_its_line_and_path(
 
 
 @pytest.mark.parametrize(("decode", "fields"), DOCUMENTS)
+def test_number_beyond_all_numbers_is_named_with_its_line_and_path(
+    decode: Decode, fields: dict[str, Any]
+) -> None:
+    rng = random.Random(0)
+    for path, value in values(fields):
+        if not isinstance(value, int | float) or path == ("schema",):
+            continue
+        number = rng.choice(["1e400", "-1e400", "123.4E+999"])
+        text = lay_out(with_value(fields, path, MARK), rng)
+        line, text = line_of(text, MARK), text.replace(f'"{MARK}"', number)
+        message = refusal(decode, text.encode(), "mine.json")
+        start = f"mine.json: line {line}: {path_text(path)}: "
+        assert message == f"{start}expected a finite number, got {number}", message
+
+
+def test_first_of_several_large_numbers_is_the_one_that_is_named() -> None:
+    text = '{"b2": 1,\n"b3": 1e401,\n"unit_mm": 1e402}'
+    message = refusal(decode_design, text.encode(), "mine.json")
+    assert message == "mine.json: line 2: b3: expected a finite number, got 1e401"
+
+
+@pytest.mark.parametrize(("decode", "fields"), DOCUMENTS)
 @pytest.mark.parametrize("seed", range(2))
 def test_misspelt_field_is_named_with_its_line_and_the_nearest_name(
     decode: Decode, fields: dict[str, Any], seed: int
