@@ -67,7 +67,7 @@ def write_whole(path: Path, data: bytes) -> None:
                 file.flush()
                 os.fsync(file.fileno())
             # A link stays a link, and its target is replaced.
-            target = path.resolve()
+            target = _target_of(path)
             _replace(scratch, target)
             _sync_folder(target.parent)
         finally:
@@ -157,9 +157,22 @@ def storage_error(operation: str, path: Path, error: OSError) -> StorageError:
     """Return the error, in one line: the failed operation, the path, the reason and the remedy."""
     remedy = _REMEDIES.get(error.errno or 0)
     reason = error.strerror or str(error) or type(error).__name__
-    return StorageError(
-        f"cannot {operation} {str(path)!r}: {reason}" + (f"; {remedy}" if remedy else "")
-    )
+    reason = broken_link(path) or reason + (f"; {remedy}" if remedy else "")
+    return StorageError(f"cannot {operation} {str(path)!r}: {reason}")
+
+
+def broken_link(path: Path) -> str:
+    """Return a clause on the link that keeps a path from leading anywhere; "" if there is none.
+
+    The path itself or a folder above it is a link whose target does not exist.
+    """
+    for each in (path, *path.parents):
+        with contextlib.suppress(OSError, ValueError):
+            if each.is_symlink() and not os.path.exists(each):  # noqa: PTH110 - takes loops
+                name = "it" if each == path else repr(str(each))
+                target = os.readlink(each)  # noqa: PTH115 - as the link has it
+                return f"{name} is a link that leads nowhere, to {target!r}: mend or remove it"
+    return ""
 
 
 @contextlib.contextmanager
@@ -182,8 +195,14 @@ def _scratch_path(path: Path) -> Path:
         raise StorageError(f"cannot write {str(path)!r}: it is a folder")
     if path.exists() and not path.is_file():
         raise StorageError(f"cannot write {str(path)!r}: it is no plain file")
-    if not path.resolve().parent.is_dir():
-        raise StorageError(
-            f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}; make it first"
-        )
-    return path.resolve().parent / f".{path.name[:_SCRATCH_CHARACTERS]}.{uuid.uuid4().hex}.part"
+    target = _target_of(path)
+    # Links in a circle lead to one of them.
+    if target.is_symlink() or not target.parent.is_dir():
+        missing = f"there is no folder {str(path.parent)!r}; make it first"
+        raise StorageError(f"cannot write {str(path)!r}: {broken_link(path) or missing}")
+    return target.parent / f".{path.name[:_SCRATCH_CHARACTERS]}.{uuid.uuid4().hex}.part"
+
+
+def _target_of(path: Path) -> Path:
+    """Return the path to which links lead; `Path.resolve` may raise where they form a circle."""
+    return Path(os.path.realpath(path))

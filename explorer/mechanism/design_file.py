@@ -18,6 +18,7 @@ import msgspec
 from explorer.errors import DesignError
 from explorer.files.json_text import check_unique_fields, located_errors
 from explorer.files.packaged import packaged_files
+from explorer.files.writing import broken_link
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Six, Tolerances
 from explorer.mechanism.pose import Triple
@@ -73,12 +74,14 @@ def load_design(preset_or_file: str) -> Design:
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise DesignError(
-            f"no preset and no file named {preset_or_file!r}; the presets are {', '.join(PRESETS)}"
-        ) from None
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
+        link = broken_link(path)
+        if isinstance(error, FileNotFoundError) and not link:
+            raise DesignError(
+                f"no preset and no file named {preset_or_file!r}; the presets are "
+                f"{', '.join(PRESETS)}"
+            ) from None
+        reason = link or getattr(error, "strerror", None) or str(error)
         raise DesignError(f"cannot read {preset_or_file!r}: {reason}") from None
     return decode_design(data, preset_or_file)
 

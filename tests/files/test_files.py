@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 from refusals import refusal
 
-from explorer.errors import StorageError
+from explorer.errors import DesignError, StorageError
 from explorer.files.writing import check_writable, make_folder, move, read_at_most, write_whole
+from explorer.mechanism.design_file import load_design
 
 REMEDIES = {
     errno.ENOSPC: "make room",
@@ -151,3 +152,31 @@ def test_write_to_a_link_replaces_its_target(tmp_path: Path) -> None:
     write_whole(link, b"new")
     assert link.is_symlink()
     assert target.read_bytes() == b"new"
+
+
+@pytest.mark.parametrize(("name", "target"), [("gone", "missing/file"), ("circle", "circle")])
+def test_link_that_leads_nowhere_is_named_with_its_target(
+    tmp_path: Path, name: str, target: str
+) -> None:
+    link, below = tmp_path / name, tmp_path / name / "file"
+    link.symlink_to(target)
+    for path, subject in ((link, "it"), (below, repr(str(link)))):
+        words = f"{subject} is a link that leads nowhere, to {target!r}: mend or remove it"
+        for message in (
+            refusal(check_writable, path, kind=StorageError),
+            refusal(write_whole, path, b"new", kind=StorageError),
+            refusal(read_at_most, path, 3, kind=StorageError),
+            refusal(make_folder, path, kind=StorageError),
+            refusal(load_design, str(path), kind=DesignError),
+        ):
+            assert message.endswith(f"{str(path)!r}: {words}")
+    assert [each.name for each in tmp_path.iterdir()] == [name]
+    assert link.is_symlink()
+
+
+def test_write_to_a_link_makes_its_missing_target(tmp_path: Path) -> None:
+    link = tmp_path / "link"
+    link.symlink_to("target")
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert (tmp_path / "target").read_bytes() == b"new"
