@@ -113,6 +113,8 @@ def _check_options(command: type[Any], argv: Sequence[str]) -> None:
         after = takewhile(lambda word: not word.startswith("--"), argv[index + 1 :])
         words[field] = [value] if equals else [*after]
     for field, option in given.items():
+        if blank := [word for word in words[field] if not word.strip()]:
+            raise UsageError(f"{option} needs a value; got {blank[0]!r}")
         _check_value(option, hints.get(field), words[field])
 
 

@@ -185,7 +185,7 @@ class SimulationModel:
         """Return the model as XML."""
         droop = self.servos.droop(self.design)
         # Drake ends at a model without a name.
-        root = ET.Element("mujoco", model=self.design.name or "untitled")
+        root = ET.Element("mujoco", model=self.design.name)
         root.append(
             _comment(
                 f"flagged-explorer {__version__}; metres, kilograms, radians",

@@ -165,7 +165,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     Attributes:
         schema: Version of the file format.
-        name: Name of the design, one printable line.
+        name: Name of the design, one printable line without surrounding space.
         unit_mm: Millimetres in one design unit.
         node_step: Grid step of the paper's node counting, in design units; None is reach / 15.
         a3: (x, y) of a3 in the base frame, in design units.
@@ -210,10 +210,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         if self.schema != 2:
             raise DesignError(f"schema must be 2; got {self.schema!r}")
         _set(self, "schema", 2)
-        checks.instance("name", self.name, str)
-        _set(self, "name", str(self.name))
-        if len(self.name) > 100 or not self.name.isprintable():
-            raise DesignError("name must be one printable line of at most 100 characters")
+        _set(self, "name", checks.title("name", self.name))
         checks.instance("home", self.home, Pose, type(None))
         for kind in (Limits, Tool, Payload, Actuators, Struts, Guide, Tolerances):
             name = kind.__name__.lower()

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import operator
+import unicodedata
 from collections.abc import Mapping, Sequence, Set
 from typing import Any, SupportsIndex, cast
 
@@ -25,6 +26,9 @@ computation, such as that of the nearest singular pose, finds some far beyond wh
 
 STIFFEST = 1e12
 """Largest stiffness in N/mm: one rigid actuator among springs is stated by a large number."""
+
+LONGEST_NAME = 100
+"""Largest number of characters of the name of a design or a study."""
 
 # Types that Python converts to a number or a sequence although no caller means one.
 _NOT_A_NUMBER = (str, bytes, bytearray, bool)
@@ -127,6 +131,28 @@ def one_of(name: str, value: object, allowed: Sequence[str]) -> str:
         words = " or ".join(f'"{word}"' for word in allowed)
         raise DesignError(f"{name} must be {words}; got {_short_repr(value)}", name)
     return str(value)
+
+
+def title(name: str, value: object) -> str:
+    """Return the value as the name of a design or a study, in the form of `tidy_name`.
+
+    It is one printable line, and not of blanks and points alone: it becomes a part of the names of
+    files.
+    """
+    instance(name, value, str)
+    tidy = tidy_name(str(value))
+    if not tidy.strip(" .") or len(tidy) > LONGEST_NAME or not tidy.isprintable():
+        raise DesignError(
+            f"{name} must be one printable line of 1 to {LONGEST_NAME} characters, and not of "
+            f"blanks and points alone; got {_short_repr(value)}",
+            name,
+        )
+    return tidy
+
+
+def tidy_name(text: str) -> str:
+    """Return a name without surrounding space, in normal form, so that equal looks are equal."""
+    return unicodedata.normalize("NFC", text).strip()
 
 
 def instance(name: str, value: object, *kinds: type) -> None:

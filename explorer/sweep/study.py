@@ -23,7 +23,7 @@ from explorer.files.writing import read_at_most
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
-from explorer.numerics.checks import instance, number, one_of, positive, two, whole
+from explorer.numerics.checks import instance, number, one_of, positive, title, two, whole
 from explorer.optimise import problem as problems
 from explorer.sweep.machine import MACHINE
 from explorer.workspace.least_clearance import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
@@ -49,7 +49,6 @@ MOST_IN_HYPERCUBE = 1_000_000
 MOST_IN_CHUNK = 100_000
 MOST_ITERATIONS = 100_000
 LARGEST_SEED = 2**31 - 1
-LONGEST_NAME = 100
 
 DEFAULT_MEASURES = ("volume", "reach", "worst_margin", "clearance", "inverse_condition")
 
@@ -175,9 +174,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     def __post_init__(self) -> None:
         _set(self, "schema", whole("schema", self.schema, 1, 1))
-        if not self.name or len(self.name) > LONGEST_NAME or not self.name.isprintable():
-            raise InputError(f"name must be one printable line of 1 to {LONGEST_NAME} characters")
-        _set(self, "name", str(self.name))
+        _set(self, "name", title("name", self.name))
         _set(self, "design", _complete(self.design))
         _set(self, "variables", _ranges("variables", self.variables, NAMES))
         _set(self, "measures", tuple(map(str, self.measures)))

@@ -137,6 +137,17 @@ def test_only_a_file_of_the_same_name_and_browser_without_a_notice_is_replaced(
     assert len(worker.orders) == 6
 
 
+@pytest.mark.parametrize(
+    ("design", "file"),
+    [("study #12", "study 12.json"), ("#", "design.json"), (".x", "design.x.json")],
+)
+def test_file_of_any_design_has_a_name_that_shows(design: str, file: str) -> None:
+    client = Mock()
+    server: Any = SimpleNamespace(get_clients=lambda: {1: client})
+    Downloads(server, StubWorker(), Mock()).send(1, f"{design}.json", b"")
+    assert client.send_file_download.call_args.args[0] == file
+
+
 @pytest.mark.parametrize("design", PRESETS.values(), ids=str)
 def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design) -> None:
     state = start = open_state(design)

@@ -21,12 +21,12 @@ from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 OPTIMAL = PRESETS["paper-optimal"]
 
 HOSTILE = (
-    "../../../etc/passwd", "C:\\Windows\\system32", "..", ".", "~", "NUL.json", ".lock",
+    "../../../etc/passwd", "C:\\Windows\\system32", "..x", "~", "NUL.json", ".lock",
     "trash", 'a/b\\c:d*e?f"g<h>i|j', "$(rm -rf ~)", "%00", "<b>bold</b>", "é", "δ1 = 0 ✓",
     "🦾" * 100,
 )  # fmt: skip
 
-REFUSED = ("", " ", "two\nlines", "nul\0", "x" * 101, "\ud800", "\u202e", "a\u2028b")
+REFUSED = ("", " ", "..", ". .", "two\nlines", "nul\0", "x" * 101, "\ud800", "\u202e", "a\u2028b")
 
 
 def design(number: int) -> Design:
@@ -206,7 +206,7 @@ BROKEN = {
     "deep.json": b"[" * 200_000,
     "large.json": b" " * 2_000_000,
     "degenerate.json": encode_design(OPTIMAL).replace(b"7.0062", b"0.0000"),
-    "nameless.json": encode_design(msgspec.structs.replace(OPTIMAL, name=" ")),
+    "nameless.json": encode_design(OPTIMAL).replace(b"paper-optimal", b" "),
     "odd \x1b[31m\n.json": b"{}",
     "x" * 245 + ".json": b"{}",
 }

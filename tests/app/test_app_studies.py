@@ -371,6 +371,10 @@ def test_folders_offer_only_studies_and_no_name_leads_elsewhere(home: Path) -> N
         with pytest.raises(InputError, match="there is no study"):
             folders.folder(name)
     assert StudyFolders(home / "nowhere").by_name() == {}
+    # A folder has a name of its own even where the path to it has none.
+    (home / "some" / "within").mkdir()
+    beside = StudyFolders(home / "nowhere", (home / "some" / "within" / "..",))
+    assert [*beside.by_name()] == ["some"]
     check_given([home / "some"])
     for folder in (home / "no study", home / "nowhere"):
         with pytest.raises(InputError, match="holds no results of a study"):

@@ -332,7 +332,7 @@ def test_name_may_hold_blanks_be_emptied_and_be_saved_right_after_typing(data_ta
         tab.page.keyboard.press("Backspace")
     tab.page.keyboard.press("Tab")
     wait_for_name("two words")
-    expect(tab.page.get_by_text("needs a name")).to_have_count(0)
+    expect(tab.page.get_by_text("The name must be")).to_have_count(0)
     # Enter leaves it, so that the next key is a command.
     name.fill("mine")
     tab.page.keyboard.press("Enter")

@@ -118,6 +118,20 @@ def test_numbers_other_words_are_quoted(cli: CommandLine, word: str) -> None:
     assert word in cli.refusal("inverse", "--position", "1", "2", word)
 
 
+@pytest.mark.parametrize("word", ["", " "])
+def test_blank_names_of_files_are_refused_before_anything_is_written(
+    cli: CommandLine, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for argv in (
+        ("inverse", "--design", word),
+        ("export", "kernel", "--out", word),
+        ("path", "--to", "12", "4", "8", f"--out={word}"),
+    ):
+        assert f" needs a value; got {word!r}" in cli.refusal(*argv)
+    assert [*tmp_path.iterdir()] == []
+
+
 def test_option_given_twice_is_refused(cli: CommandLine) -> None:
     for command in COMMANDS:
         for field in dataclasses.fields(load_command(command, COMMANDS)):

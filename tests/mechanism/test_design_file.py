@@ -62,7 +62,10 @@ def message_of(data: bytes | dict[str, Any], source: str = "some.json") -> str:
         ({"name": 1}, "name"),
         *(
             ({"name": name}, "name must be one printable line")
-            for name in ("a\nb", "\0", "\x7f", "\x1b[31m", "\u202ex", "\u2028", "x" * 101)
+            for name in (
+                *("a\nb", "\0", "\x7f", "\x1b[31m", "\u202ex", "\u2028", "x" * 101),
+                *("", "   ", "\u2003", ".", "..", " . "),
+            )
         ),
         ({"unit_mm": 0}, "unit_mm must be positive"),
         ({"unit_mm": None}, "unit_mm"),

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from strategies import designs
 
 from explorer import Actuators, Design, Guide, Limits, Payload, Pose, Struts, Tolerances, Tool
+from explorer.numerics.checks import tidy_name
 
 finite = st.floats(-1e3, 1e3)
 lengths = st.floats(0.0, 1e3)
@@ -24,6 +25,9 @@ poses = st.builds(
     Pose,
     triples,
     st.tuples(finite, finite, finite, finite).filter(lambda q: max(map(abs, q)) > 1e-6),
+)
+titles = st.text(max_size=100).filter(
+    lambda text: text.isprintable() and text.strip(" .") != "" and len(tidy_name(text)) <= 100
 )
 
 
@@ -70,7 +74,7 @@ def complete_designs(draw: st.DrawFn) -> Design:
     ideal: dict[str, Any] = {}
     return msgspec.structs.replace(
         draw(designs()),
-        name=draw(st.text(max_size=100).filter(str.isprintable)),
+        name=draw(titles),
         unit_mm=draw(st.floats(1e-3, 1e3)),
         node_step=draw(st.none() | st.floats(1e-3, 1e3)),
         limits=draw(limits()),

@@ -127,7 +127,7 @@ def test_packaged_studies_can_be_run_and_no_variable_is_a_measure() -> None:
         ({"chunk": 0}, "chunk must lie within 1"),
         ({"clearance_margin": -1}, "clearance_margin must be positive"),
         ({"design": "paper"}, "no preset 'paper'"),
-        ({"name": "two\nlines"}, "one printable line"),
+        *(({"name": name}, "one printable line") for name in ("two\nlines", "", "  ", "..")),
         ({"schema": 2}, "schema"),
         ({"colour": "red"}, "colour is unknown"),
     ],

@@ -117,5 +117,8 @@ class Downloads:
 
 
 def _send(client: viser.ClientHandle, name: str, data: bytes) -> None:
-    # Shells and addresses read a "#" as the end of a name; designs of studies have one.
-    client.send_file_download(name.replace("#", ""), data, save_immediately=True)
+    # Shells and addresses read a "#" as the end of a name; designs of studies have one. A name that
+    # begins with a point is hidden.
+    name = name.replace("#", "").lstrip(" ")
+    name = f"design{name}" if name.startswith(".") else name
+    client.send_file_download(name, data, save_immediately=True)

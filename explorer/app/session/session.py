@@ -31,6 +31,7 @@ UNDONE = "Another browser has undone {}. Redo or History brings it back."
 
 # Names of the fields of a design file in the words of the page.
 FIELD_WORDS = {
+    "name": "The name",
     "unit_mm": "The unit",
     "node_step": "The step of the nodes",
     "limits.leg_radii": "The radius of a leg",

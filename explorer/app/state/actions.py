@@ -297,14 +297,11 @@ class SetName(Action):
         """Return the next state.
 
         Raises:
-            DesignError: The name is not one printable line.
-            InputError: The name is empty, or the design is being optimised.
+            DesignError: The name is blank, or not one printable line.
+            InputError: The design is being optimised.
         """
         check_free(state)
-        name = self.name.strip()
-        if not name:
-            raise InputError(f"a design needs a name; it stays {state.design.name!r}")
-        return replace(state, design=msgspec.structs.replace(state.design, name=name))
+        return replace(state, design=msgspec.structs.replace(state.design, name=self.name))
 
 
 @dataclass(frozen=True)

@@ -59,4 +59,4 @@ class Compared:
 
 def without_name(design: Design) -> Design:
     """Return a design without its name, on which nothing else depends."""
-    return msgspec.structs.replace(design, name="")
+    return msgspec.structs.replace(design, name="untitled")

@@ -13,7 +13,6 @@ import itertools
 import os
 import re
 import time
-import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,11 +23,11 @@ from explorer.errors import InputError
 from explorer.files.writing import make_folder, move, read_at_most, write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, decode_design, encode_design
+from explorer.numerics.checks import LONGEST_NAME, tidy_name
 
 # Names of the folder of designs in the user's data folder, and of the folder in it that keeps those
 # deleted or replaced.
 DESIGNS, TRASH = "designs", "trash"
-LONGEST_NAME = 100
 # Number of characters of a design's name in its file's name, and of digits of the hash.
 _SLUG, _DIGITS = 40, 12
 # Suffix of the name of a copy.
@@ -84,14 +83,14 @@ class Library:
         """Save a design under a name; return the design with this name.
 
         Args:
-            name: One printable line of at most 100 characters; surrounding space is removed.
+            name: Name of the design, see `Design`.
             design: The design; another one that has the name goes to the trash.
 
         Raises:
             InputError: A name that cannot be used.
             StorageError: It cannot be written.
         """
-        named = _with_name(design, name)
+        named = msgspec.structs.replace(design, name=name)
         entry = self._designs().get(named.name)
         make_data_folder(self.folder)
         if entry is not None and entry.design is not None and entry.design != named:
@@ -107,7 +106,7 @@ class Library:
             StorageError: It cannot be written.
         """
         entry = self._entry(name)
-        renamed = _with_name(self.open(name), new)
+        renamed = msgspec.structs.replace(self.open(name), name=new)
         if renamed.name != entry.name:
             if renamed.name in self._designs():
                 raise InputError(f"there is a design called {renamed.name!r} already")
@@ -165,7 +164,7 @@ class Library:
     def _entry(self, name: str) -> Entry:
         entries = self.list()
         for entry in entries:
-            if entry.name in (name, _tidy(name)):
+            if entry.name in (name, tidy_name(name)):
                 return entry
         names = [repr(each.name) for each in entries if each.design is not None]
         known = ", ".join(names[:4]) + (", …" if len(names) > 4 else "")
@@ -190,20 +189,6 @@ def copy_name(name: str, taken: set[str]) -> str:
     return next(copy for copy in copies if copy not in taken)
 
 
-def _tidy(name: str) -> str:
-    """Return a name without surrounding space, in normal form, so that equal looks are equal."""
-    return unicodedata.normalize("NFC", name).strip()
-
-
-def _with_name(design: Design, name: str) -> Design:
-    tidy = _tidy(name)
-    if not tidy or len(tidy) > LONGEST_NAME or not tidy.isprintable():
-        raise InputError(
-            f"a name is one printable line of 1 to {LONGEST_NAME} characters; got {name!r}"
-        )
-    return msgspec.structs.replace(design, name=tidy)
-
-
 def _date(path: Path) -> None:
     """Date a file, by which lists are ordered; a system may date those of 10 ms alike."""
     now = time.time_ns()
@@ -217,8 +202,4 @@ def _read(path: Path) -> Entry:
         design = decode_design(read_at_most(path, LARGEST_FILE), repr(printable))
     except InputError as error:
         return Entry(printable, path.name, None, str(error))
-    name = _tidy(design.name)
-    if not name:
-        problem = f"{printable!r}: the design has no name; give it one"
-        return Entry(printable, path.name, None, problem)
-    return Entry(name, path.name, design)
+    return Entry(design.name, path.name, design)

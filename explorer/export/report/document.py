@@ -41,7 +41,7 @@ def report_html(data: ReportData, date: dt.date) -> str:
 
     Equal data give equal reports, except for the date and the versions of the libraries.
     """
-    title = f"{_name(data)} – design report"
+    title = f"{data.design.name} – design report"
     style = packaged_file("export/report", "style.css").read_text("utf-8") + drawing_style()
     head = element(
         "head",
@@ -62,7 +62,7 @@ def report_html(data: ReportData, date: dt.date) -> str:
 
 def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
     yield element("p", "Design report", class_="kind")
-    yield element("h1", _name(data))
+    yield element("h1", data.design.name)
     yield element("p", "Flagged 4-4 parallel manipulator", class_="subtitle")
     code = _hash(data)
     particulars = (
@@ -75,10 +75,6 @@ def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
     caption = f"The mechanism in {data.pose_words}."
     yield markup.illustration(cover_drawing(data.snapshot), caption)
     yield element("dl", *(_entry(*each) for each in _headline(data)), class_="headline")
-
-
-def _name(data: ReportData) -> str:
-    return data.design.name or "untitled"
 
 
 def _hash(data: ReportData) -> str:

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import msgspec
 import numpy as np
 
 from explorer.app.scene.placing import round_step
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.actions import Action
+from explorer.app.state.compared import without_name
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.measures.blocks.source import LoadTopic, Source, load_source
@@ -110,7 +110,7 @@ def _weights_request(frame: Frame) -> tuple[Design, float] | None:
     view = frame.state.view
     if view.forces.weighed != "payload and legs":
         return None
-    return msgspec.structs.replace(frame.state.design, name=""), view.prototype.density
+    return without_name(frame.state.design), view.prototype.density
 
 
 WEIGHTS_FEED = feed_of(weights_of_parts, _weights_request)

@@ -16,11 +16,11 @@ from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, pr
 from explorer.app.state.actions import Action, Open, Set, check_free, move_to
 from explorer.app.state.parts import parts_kept_on_open, with_value
 from explorer.app.state.state import State
-from explorer.app.storage.library import LONGEST_NAME
 from explorer.errors import InputError, NoAnswerError
 from explorer.measures.catalogue import Measurements
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
+from explorer.numerics.checks import LONGEST_NAME
 from explorer.optimise import conflicts, defaults
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import MAXIMA, SWING_LIMIT, YAW, with_box

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
-import msgspec
 import numpy as np
 
 from explorer.app.scene.surfaces import Drawn, with_creases
 from explorer.app.session.feed import Feed, feed_of
+from explorer.app.state.compared import without_name
 from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
@@ -115,7 +115,7 @@ def _request_for(frame: Frame) -> Design | None:
     """Return the design without its name, on which the parts do not depend."""
     if frame.state.view.drawn_as != "prototype":
         return None
-    return msgspec.structs.replace(frame.state.design, name="")
+    return without_name(frame.state.design)
 
 
 PartsFeed: TypeAlias = Feed[Design, Parts | ExplorerError]

@@ -44,7 +44,10 @@ class StudyFolders:
 
     def __init__(self, home: Path, given: Sequence[Path] = ()) -> None:
         self.home = home
-        self.given = tuple(path.absolute() for path in given)
+        # The name of ".." is that of the folder that it means.
+        self.given = tuple(
+            path.resolve() if path.name in ("", "..") else path.absolute() for path in given
+        )
 
     def by_name(self) -> dict[str, Path]:
         """Return the folders that hold a study, by name; those that were given first."""

@@ -18,6 +18,7 @@ from explorer.measures.catalogue import CATALOGUE, measures_in, unmet_needs
 from explorer.measures.measure import Case
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray
+from explorer.numerics.checks import LONGEST_NAME
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
 from explorer.sweep import study as sweeps
@@ -200,7 +201,7 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> sweeps.Study:
         raise InputError(f"the design has {lacking}")
     ranges = {v: range_around(design, v, plan.percent) for v in plan.variables}
     return sweeps.Study(
-        name=name[: sweeps.LONGEST_NAME],
+        name=name[:LONGEST_NAME],
         design=design,
         variables=ranges,
         sampling=sweeps.Sampling(method="sobol", count=plan.count),
