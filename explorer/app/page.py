@@ -59,6 +59,8 @@ FEATURES: tuple[Feature, ...] = (
 TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})
 # Scripts of the whole page.
 SCRIPTS = (
+    # Before all that reads keys.
+    "keys",
     "throttles",
     "markup",
     "frames",

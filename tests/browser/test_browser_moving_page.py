@@ -188,6 +188,10 @@ def test_moving_page_draws_and_turns_and_fits_a_telephone(page: Page, tmp_path: 
     for key in ("ArrowLeft", "+", "f"):
         canvas.press(key)
         pictures.append(canvas.screenshot())
+    # On a Russian keyboard another letter stands where F does.
+    canvas.press("+")
+    canvas.dispatch_event("keydown", {"key": "а", "code": "KeyF"})
+    assert canvas.screenshot() == pictures[-1]
     box = canvas.bounding_box()
     assert box
     page.mouse.move(box["x"] + 50, box["y"] + 50)

@@ -562,8 +562,9 @@ window.startPage = (design) => {
   find("home").addEventListener("click", goHome);
   find("fit").addEventListener("click", fit);
   find("canvas").addEventListener("dblclick", fit);
-  find("canvas").addEventListener("keydown", (event) => {
-    if (event.key === "f" || event.key === "F") fit();
+  find("canvas").addEventListener("keydown", ({ key, code }) => {
+    // A key that writes no Latin letter goes by its place.
+    if (/^f$/i.test(key) || (code === "KeyF" && !/\p{Script=Latin}/u.test(key))) fit();
   });
   find("all").open = window.innerWidth >= 1100;
   find("scale").textContent = scene.isReady
