@@ -9,12 +9,14 @@ import io
 import math
 import os
 import random
+import re
 import signal
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Generator
+from concurrent.futures import Future, wait
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,8 +25,9 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 
 import psutil
+import server_clock
 import viser
-from client import press_update, presses_in
+from client import press_update, presses_in, wait_for
 from page_props import differences, shown_by
 from server_clock import wait_until_drawn
 from socket_tab import SocketTab
@@ -32,6 +35,7 @@ from socket_tab import SocketTab
 from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
+from explorer.app.session.session import UNDONE
 from explorer.app.session.worker import RESTARTED
 from explorer.app.state.actions import Open
 from explorer.app.storage.library import Library
@@ -45,6 +49,16 @@ BETWEEN_LOOKS = 1000
 PATIENCE_SECONDS = 120.0
 # Between two kills of the worker.
 KILL_SECONDS = 5.0
+# Notices of what these hands do themselves: they kill the worker, and undo in one tab what
+# another one has done.
+EXPECTED = re.compile(
+    "|".join((re.escape(RESTARTED), ".*".join(map(re.escape, UNDONE.split("{}")))))
+)
+# The button by whose press a tab tells that all it has sent before has been handled.
+HEARD = "monkey.heard"
+# Seconds that pass in a second of the machine's while a slider is dragged, lest a drag on a busy
+# machine becomes two, and those after which the next gesture is another one.
+SLOW_PACE, REST_SECONDS = 0.001, 2.0
 
 BROKEN = (
     b"",
@@ -84,10 +98,13 @@ class Monkey:
 
     Args:
         running: The explorer.
-        seed: For what it does; how its events fall between frames is not repeatable.
+        seed: For what it does.
+        in_turn: Whether each event waits until the explorer has handled the one before, and each
+            gesture until it is at rest. Then a seed does the same in every run; else how the
+            events fall between frames is not repeatable.
     """
 
-    def __init__(self, running: Running, seed: int) -> None:
+    def __init__(self, running: Running, seed: int, *, in_turn: bool = False) -> None:
         self.running = running
         self.report = Report()
         self._random = random.Random(seed)
@@ -112,6 +129,13 @@ class Monkey:
         page: Any = running.page
         page._notify = self._listen(page._notify)
         page.session._report = self._keep_fault
+        self._in_turn = in_turn
+        self._calls: list[Future[Any]] = []
+        self._heard: set[str] = set()
+        if in_turn:
+            pool = self._gui._thread_executor
+            pool.submit = self._keep_call(pool.submit)
+            running.page.buttons.on(HEARD, lambda value, _: self._heard.add(value))
 
     def run(self, actions: int) -> Report:
         """Do so many things, look now and then, and say what came of it."""
@@ -129,7 +153,7 @@ class Monkey:
         while self.report.actions < actions:
             _, act = self._random.choices(self._does, weights)[0]
             before = self.report.actions
-            act()
+            self._do(act)
             since += self.report.actions - before
             if since >= BETWEEN_LOOKS:
                 since = 0
@@ -137,6 +161,39 @@ class Monkey:
         self.look()
         for tab in self._tabs:
             tab.close()
+
+    def _do(self, act: Callable[[], None]) -> None:
+        if not self._in_turn:
+            act()
+            return
+        server_clock.set_pace(SLOW_PACE)
+        try:
+            act()
+        finally:
+            server_clock.set_pace(1.0)
+        server_clock.advance(REST_SECONDS)
+        self._settle()
+        assert server_clock.settle(self.running.page, PATIENCE_SECONDS)
+
+    def _keep_call(self, submit: Callable[..., Future[Any]]) -> Callable[..., Future[Any]]:
+        """Return how to call on a thread of viser's, so that it can be waited for."""
+
+        def submit_and_keep(*arguments: Any) -> Future[Any]:
+            call = submit(*arguments)
+            self._calls.append(call)
+            return call
+
+        return submit_and_keep
+
+    def _hear(self) -> None:
+        """Wait until all that the tabs have sent is handled."""
+        self._heard.clear()
+        for number, tab in enumerate(self._tabs):
+            tab.update(*press_update(self.running, HEARD, str(number)))
+            wait_for(lambda number=number: str(number) in self._heard)
+        wait(self._calls, PATIENCE_SECONDS)
+        self._calls.clear()
+        assert self.running.page.session.wait_until_idle(PATIENCE_SECONDS)
 
     def look(self) -> None:
         """Wait for quiet, and compare the page with a new one of the same state."""
@@ -184,8 +241,7 @@ class Monkey:
         """Return how to notify people, so that what is no fault of theirs is kept."""
 
         def notify_and_keep(title: str, message: str, who: int | None) -> None:
-            # A worker that was killed is told of, and nothing else comes of it.
-            if title != REFUSAL and message != RESTARTED:
+            if title != REFUSAL and not EXPECTED.fullmatch(message):
                 self.report.faults.append(message)
             notify(title, message, who)
 
@@ -293,8 +349,17 @@ class Monkey:
         """Close a tab and open it again."""
         index = self._random.randrange(TABS)
         self._tabs[index].close()
-        self._tabs[index] = SocketTab(self.running.url)
+        self._open(index)
         self._did()
+
+    def _open(self, index: int) -> None:
+        """Open a tab in the place of one that has gone."""
+        clients = self.running.viser.get_clients
+        if self._in_turn:
+            wait_for(lambda: len(clients()) == TABS - 1)
+        self._tabs[index] = SocketTab(self.running.url)
+        if self._in_turn:
+            wait_for(lambda: len(clients()) == TABS)
 
     def _vanish(self) -> None:
         """Lose a tab in mid-drag, without a word."""
@@ -306,13 +371,14 @@ class Monkey:
             tab.update(handle._impl.uuid, self._random.uniform(handle.min, handle.max))
             self._did()
         tab.drop()
-        self._tabs[index] = SocketTab(self.running.url)
+        self._open(index)
 
     def _kill(self) -> None:
         """Kill the worker that draws the workspace, whatever it is doing."""
         number = self.running.page.worker.process_id
-        # Twice over the same work it is given up.
-        if number is not None and time.monotonic() - self._killed > KILL_SECONDS:
+        # Twice over the same work it is given up; at rest it has none.
+        is_time = self._in_turn or time.monotonic() - self._killed > KILL_SECONDS
+        if number is not None and is_time:
             self._killed = time.monotonic()
             with suppress(ProcessLookupError):
                 os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
@@ -345,6 +411,8 @@ class Monkey:
 
     def _did(self) -> None:
         self.report.actions += 1
+        if self._in_turn:
+            self._hear()
 
 
 def _is(handle: Any, kind: type) -> bool:
