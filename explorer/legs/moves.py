@@ -26,6 +26,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple, rotation_array
 from explorer.numerics import arrays
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.number_text import format_apart
 
 # Tolerances as shares of the reach, or of the longest travel of a leg's end if that is longer.
 DEFAULT_TOLERANCE = 1e-6
@@ -330,7 +331,8 @@ def _least_distances(
     if requested is not None:
         least_one = SMALLEST_TOLERANCE * float(size.max(initial=design.reach))
         if not requested >= least_one:
-            raise InputError(f"the tolerance must be at least {least_one:.2g}; got {requested:g}")
+            least_text, got = format_apart((least_one, requested), 3)
+            raise InputError(f"the tolerance must be at least {least_text}; got {got}")
         tolerances = np.full(len(size), requested)
     bound = np.full((len(size), len(PAIRS)), np.inf)
     least, share = bound.copy(), np.zeros(bound.shape)

@@ -31,7 +31,7 @@ from explorer.mechanism.points import Variables, platform_points
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics import checks
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import Unit
+from explorer.numerics.number_text import Unit, format_apart
 
 JOINTS = ("l1", "d1", "d2", "d3", "d4", "l4")
 """The joint variables, in the order of every array axis of six."""
@@ -94,8 +94,9 @@ class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if angle is not None:
                 checked = checks.positive(f"limits.swing.{name}", angle)
                 if checked > 180.0:
+                    most, got = format_apart((180.0, checked))
                     raise DesignError(
-                        f"limits.swing.{name} is a half-angle of at most 180°; got {checked:g}",
+                        f"limits.swing.{name} is a half-angle of at most {most}°; got {got}",
                         f"limits.swing.{name}",
                     )
                 _set(self, name, checked)
@@ -140,8 +141,9 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if high is not None:
                 high = checks.number(f"limits.{name} maximum", high)
                 if high < low:
+                    least, most = format_apart((low, high))
                     raise DesignError(
-                        f"limits.{name}: the minimum {low:g} exceeds the maximum {high:g}",
+                        f"limits.{name}: the minimum {least} exceeds the maximum {most}",
                         f"limits.{name}",
                     )
             _set(self, name, (low, high))

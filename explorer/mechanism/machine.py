@@ -17,6 +17,7 @@ from explorer.errors import DesignError
 from explorer.mechanism.pose import Quadruple, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import MOST, STIFFEST, not_negative, numbers, positive, two
+from explorer.numerics.number_text import format_apart
 
 Pair = tuple[float, float]
 Six = tuple[float, float, float, float, float, float]
@@ -169,9 +170,9 @@ class Struts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 _set(self, name, positive(f"struts.{name}", value))
         _set(self, "inner_mm", not_negative("struts.inner_mm", self.inner_mm))
         if self.outer_mm is not None and self.inner_mm >= self.outer_mm:
+            inner, outer = format_apart((self.inner_mm, self.outer_mm))
             raise DesignError(
-                f"struts.inner_mm must be below the outer diameter {self.outer_mm:g}; "
-                f"got {self.inner_mm:g}",
+                f"struts.inner_mm must be below the outer diameter {outer}; got {inner}",
                 "struts.inner_mm",
             )
 
@@ -261,9 +262,10 @@ def check_near(name: str, point: Triple, reach: float) -> None:
     """Check that a point of the platform lies within `LARGEST_DISTANCE` of b4."""
     distance, most = math.hypot(*point), LARGEST_DISTANCE * reach
     if distance > most:
+        end, got = format_apart((most, distance))
         raise DesignError(
-            f"{name} must lie within {LARGEST_DISTANCE:g} reaches ({most:g}) of b4; "
-            f"got a distance of {distance:g}",
+            f"{name} must lie within {LARGEST_DISTANCE:g} reaches ({end}) of b4; "
+            f"got a distance of {got}",
             name,
         )
 

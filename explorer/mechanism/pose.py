@@ -20,6 +20,7 @@ from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.numerics.checks import FARTHEST
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.number_text import format_apart
 
 Triple = tuple[float, float, float]
 Quadruple = tuple[float, float, float, float]
@@ -141,9 +142,9 @@ def rotation_array(rotation: ArrayLike) -> FloatArray:
         measure_rotations(len(matrices), matrices, bounds)
         deviation, determinant = bounds.tolist()
     if deviation > ORTHONORMAL_TOLERANCE:
+        most, got = format_apart((ORTHONORMAL_TOLERANCE, deviation), 3)
         raise InputError(
-            f"rotation must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; "
-            f"R Rᵀ is off the identity by {deviation:.3g}"
+            f"rotation must be orthonormal to {most}; R Rᵀ is off the identity by {got}"
         )
     if determinant < 0.0:
         raise InputError("rotation must have determinant +1; this one is a reflection")

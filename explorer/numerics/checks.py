@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence, Set
 from typing import Any, SupportsIndex, cast
 
 from explorer.errors import DesignError
+from explorer.numerics.number_text import format_apart
 
 LEAST, MOST = 1e-7, 1e6
 """Bounds of the size of a number that a user gives, in its unit."""
@@ -43,9 +44,9 @@ def size_problem(value: float, least: float = 0.0, most: float = MOST) -> str:
     if not math.isfinite(value):
         return f"must be a finite number; got {value}"
     if abs(value) > most:
-        return f"must not exceed {most:g} in size; got {value:.12g}"
+        return f"must not exceed {most:g} in size; got {format_apart((value, most), 12)[0]}"
     if 0.0 < abs(value) < least:
-        return f"must be at least {least:g} in size; got {value:.12g}"
+        return f"must be at least {least:g} in size; got {format_apart((value, least), 12)[0]}"
     return ""
 
 
@@ -82,7 +83,8 @@ def ordered_pair(name: str, low: object, high: object) -> tuple[float, float]:
     """Return both values as floats, the first not above the second."""
     first, second = number(f"{name} low", low), number(f"{name} high", high)
     if first > second:
-        raise DesignError(f"{name}: the low end {first:g} exceeds the high end {second:g}", name)
+        low, high = format_apart((first, second))
+        raise DesignError(f"{name}: the low end {low} exceeds the high end {high}", name)
     return first, second
 
 

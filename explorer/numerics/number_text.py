@@ -14,7 +14,7 @@ number that rounds to zero has no sign.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 # Powers of ten from which on, and below which, a number for people is written without one.
@@ -24,6 +24,8 @@ POWERS = {1: "", 2: "²", 3: "³"}
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # Sizes from which on, and below which, a number fitted to its size is written without one.
 LEAST_SIZE, MOST_SIZE = 1e-3, 1e7
+# Digits that tell any two numbers apart.
+MOST_DIGITS = 17
 # Share of its size up to which a number is a rounding error.
 ROUNDING = 1e-12
 
@@ -95,6 +97,21 @@ def format_ascii(value: float, digits: int, *, size: float = 0.0, padded: bool =
     format "g": 0.0001, 1e-05, and 1.235e+05 to four digits. Trailing zeros stay if `padded`.
     """
     return f"{drop_rounding(value, size):{'#' if padded else ''}.{digits}g}"
+
+
+def format_apart(
+    values: Sequence[float], digits: int = 6, write: Callable[[float, int], str] = format_ascii
+) -> list[str]:
+    """Return numbers with so many digits, or with as many more as make unequal ones differ.
+
+    A message that a value exceeds a limit shows both. `write` formats a number to some digits.
+    """
+    texts: list[str] = []
+    for count in range(digits, MOST_DIGITS + 1):
+        texts = [write(value, count) for value in values]
+        if len({*texts}) == len({*values}):
+            break
+    return texts
 
 
 def format_fixed(value: float, decimals: int) -> str:

@@ -19,7 +19,7 @@ from explorer.mechanism.design import LENGTHS, Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import SINGULAR, planes_of_singularity
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import UNITS, Unit
+from explorer.numerics.number_text import UNITS, Unit, format_apart
 from explorer.optimise import problem as problems
 from explorer.workspace.limits.table import GAP
 
@@ -173,10 +173,9 @@ def _of_volume(intervals: Intervals) -> Iterator[Conflict]:
     unit = intervals.unit.to_power(3, wanted)
     for limit, words, most in volume_bounds(intervals):
         if most < wanted * (1.0 - SPARE):
-            # As many digits as let them differ.
-            digits = 4 if most < 0.999 * wanted else 8
-            room, demanded = unit.number(most, digits), unit.text(wanted, digits)
-            yield Conflict(limit, f"{words} at most {room} of the {demanded} asked for")
+            room, demanded = format_apart((most, wanted), 4, unit.number)
+            amounts = f"at most {room} of the {demanded} {unit.name} asked for"
+            yield Conflict(limit, f"{words} {amounts}")
 
 
 def _of_lengths(intervals: Intervals) -> Iterator[Conflict]:
@@ -184,13 +183,13 @@ def _of_lengths(intervals: Intervals) -> Iterator[Conflict]:
     unit = intervals.unit
     longest = max(intervals.maximum(name)[1] for name in LENGTHS)
     if demanded is not None and longest > demanded * (1.0 + SPARE):
-        least, most = (unit.text(length, 6) for length in (longest, demanded))
+        least, most = format_apart((longest, demanded), 6, unit.text)
         yield Conflict(
             LONGEST_LEG, f"the longest leg is at least {least}, and {most} are asked for"
         )
     apart = float(np.abs(intervals.apart).max())
     if apart < gap * (1.0 - SPARE):
-        most, least = unit.text(apart), unit.text(gap, 6)
+        most, least = format_apart((apart, gap), 4, unit.text)
         words = f"the carriages are at most {most} apart, and the gap is to be {least}"
         yield Conflict(GAP, words)
 
@@ -201,18 +200,21 @@ def _of_required_box(intervals: Intervals) -> Iterator[Conflict]:
         return
     shifts, unit = intervals.of(*problems.SHIFTS), intervals.unit
     for axis, name in enumerate("xyz" if box is not None else ""):
-        (low, high), (least, most) = ends = np.array([required, box])[:, :, axis].tolist()
+        (low, high), (least, most) = np.array([required, box])[:, :, axis].tolist()
         # It may be shifted by what lies in both intervals, if anything does.
         back, on = max(least - low, shifts[axis, 0]), min(most - high, shifts[axis, 1])
         if back > on + SPARE * max(most - least, high - low):
-            own, other = (f"{unit.number(a, 6)} to {unit.text(b, 6)}" for a, b in ends)
+            texts = format_apart([low, high, least, most], 6, unit.number)
+            own, other = (f"{a} to {b} {unit.name}" for a, b in (texts[:2], texts[2:]))
             words = f"along {name} the required box from {own} lies beyond the box from {other}"
             yield Conflict(BOX_LIMIT, words)
     for name, needed in needed_lengths(intervals, required).items():
         limit, _, most = intervals.maximum(name)
         if needed > most * (1.0 + SPARE):
-            words = f"the required box needs {name} up to {unit.text(needed)}"
-            yield Conflict(limit, f"{words}, and the {limit} is {unit.text(most, 6)}")
+            up, end = format_apart((needed, most), 4, unit.text)
+            yield Conflict(
+                limit, f"the required box needs {name} up to {up}, and the {limit} is {end}"
+            )
 
 
 def _of_margins(intervals: Intervals) -> Iterator[Conflict]:
@@ -233,7 +235,7 @@ def _of_margins(intervals: Intervals) -> Iterator[Conflict]:
             for normal in (signs[index] * planes[index], -signs[index] * planes[index])
         )
         if least is not None and own < least - SPARE * problem.size:
-            most, demanded = intervals.unit.text(own), intervals.unit.text(least, 6)
+            most, demanded = format_apart((own, least), 4, intervals.unit.text)
             words = f"the margin over the required box is at most {most}, and the limits demand"
             yield Conflict("margin", f"{words} {demanded}")
         if needs_regular and max(own, other) <= rounding:

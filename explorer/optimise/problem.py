@@ -18,6 +18,7 @@ from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.numerics import checks
+from explorer.numerics.number_text import format_apart
 from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import part_limits
 from explorer.workspace.limits.table import bounds_angles
@@ -38,14 +39,10 @@ for it, the largest volume, the largest worst margin over the required box, and 
 smallest largest share of a limit under the design's load, the smallest worst error, and the
 smallest deflection under that load."""
 
-OF_THE_MACHINE: tuple[ObjectiveName, ...] = (
-    "smallest-load",
-    "smallest-error",
-    "smallest-deflection",
-)
+OF_THE_MACHINE = OBJECTIVES[4:]
 """Objectives that are about the machine around the mechanism."""
 
-OVER_BOX: tuple[ObjectiveName, ...] = ("largest-margin", *OF_THE_MACHINE)
+OVER_BOX = OBJECTIVES[3:]
 """Objectives that are the worst of several values over the required box."""
 
 YAW = "yaw"
@@ -306,21 +303,22 @@ def _check_variables(problem: Problem) -> None:
         raise InputError(f"each variable may be named once; got {', '.join(names)}")
     for variable, value in zip(problem.variables, problem.start_values, strict=True):
         unit = "°" if variable.name == YAW else ""
-        if variable.low > variable.high:
-            raise InputError(
-                f"the bounds of {variable.name} cross: low {variable.low:g}{unit}, "
-                f"high {variable.high:g}{unit}"
-            )
         if not variable.low <= value <= variable.high:
+            low, high, own = format_apart((variable.low, variable.high, value))
+            if variable.low > variable.high:
+                raise InputError(
+                    f"the bounds of {variable.name} cross: low {low}{unit}, high {high}{unit}"
+                )
             raise InputError(
-                f"the start has {variable.name} = {value:g}{unit}, outside its bounds "
-                f"{variable.low:g}{unit} to {variable.high:g}{unit}: widen them or start elsewhere"
+                f"the start has {variable.name} = {own}{unit}, outside its bounds {low}{unit} to "
+                f"{high}{unit}: widen them or start elsewhere"
             )
         least_reach = max(LEAST_REACH * value, longest_minimum(start))
         if variable.name == REACH and not variable.low >= least_reach:
+            least, low = format_apart((least_reach, variable.low))
             raise InputError(
-                f"the reach must stay above every minimum length, so its low bound above "
-                f"{least_reach:g}; got {variable.low:g}"
+                "the reach must stay above every minimum length, so its low bound above "
+                f"{least}; got {low}"
             )
         if variable.name in SHIFTS and problem.demands.required_box is None:
             raise InputError(f"{variable.name} shifts the required box, and none is given")
@@ -340,9 +338,10 @@ def _check_demands(problem: Problem) -> None:
     for name, distance in distances_of(problem.start).items():
         # A start made of rounded numbers may lie on the bound.
         if abs(distance) < demands.least * (1.0 - DEGENERATE_RATIO):
+            own, least = format_apart((abs(distance), demands.least))
             raise InputError(
-                f"the start has |{name}| = {abs(distance):g}, below the least allowed "
-                f"{demands.least:g}: start elsewhere or lower it"
+                f"the start has |{name}| = {own}, below the least allowed {least}: start elsewhere "
+                "or lower it"
             )
 
 

@@ -28,6 +28,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.folds import FOLD_LINES, from_folds, to_folds, write_poses
 from explorer.mechanism.margins import INCIDENCES, mode_name
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.number_text import format_apart
 from explorer.paths import search
 from explorer.paths.loads import ROUNDING, DemandedLoad
 from explorer.singularity.strata import incidences
@@ -206,7 +207,7 @@ def _check_ends(start: Snapshot, goal: Snapshot, load: DemandedLoad | None) -> N
             shares = load.shares(end.pose.position, end.pose.rotation)
             part, share = int(shares.argmax()), float(shares.max())
             if share > 1.0 + ROUNDING:
-                number = f"{100.0 * share:.{4 if share > 1.001 else 9}g}"
+                number, _ = format_apart((100.0 * share, 100.0), 4)
                 raise InputError(
                     f"the {name} does not hold the load: {PART_NAMES[part]} at {number} % of its "
                     "limit"

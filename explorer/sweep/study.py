@@ -24,6 +24,7 @@ from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.checks import instance, number, one_of, positive, title, two, whole
+from explorer.numerics.number_text import format_apart
 from explorer.optimise import problem as problems
 from explorer.sweep.machine import MACHINE
 from explorer.workspace.least_clearance import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
@@ -245,9 +246,10 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 MACHINE[name].check(name, low)
             least = problems.longest_minimum(self.base)
             if name == problems.REACH and not low > least:
+                end, start = format_apart((least, low))
                 raise InputError(
-                    f"the reach must stay above every minimum length, so above {least:g}; it "
-                    f"starts at {low:g}"
+                    f"the reach must stay above every minimum length, so above {end}; it starts "
+                    f"at {start}"
                 )
 
     def _check_sampling(self) -> None:
@@ -263,9 +265,8 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 "take sobol for more designs"
             )
         if self.count > MOST_DESIGNS:
-            raise InputError(
-                f"the grid has {self.count:.3g} designs; at most {MOST_DESIGNS:.3g} are made"
-            )
+            count, most = format_apart((self.count, MOST_DESIGNS), 3)
+            raise InputError(f"the grid has {count} designs; at most {most} are made")
 
     def _check_measures(self) -> None:
         known = measures_in("studies")
@@ -341,8 +342,9 @@ def _ranges(
         first, last = two(f"the range of {name}", ends)
         low, high = number(f"the low end of {name}", first), number(f"the high end of {name}", last)
         if not low < high:
+            start, end = format_apart((low, high))
             raise InputError(
-                f"the range of {name} is empty: {low:g} to {high:g}; the low end must lie below "
+                f"the range of {name} is empty: {start} to {end}; the low end must lie below "
                 "the high one"
             )
         ranges[str(name)] = (low, high)

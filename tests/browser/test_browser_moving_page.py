@@ -139,6 +139,12 @@ def test_moving_page_moves_by_fields_sliders_modes_and_keys(page: Page, tmp_path
     page.get_by_label("x (mm)").fill("23,5 cm")
     page.keyboard.press("Enter")
     expect(page.locator("#broken")).to_contain_text("x of b4 is 235.0 mm, above its maximum of 200")
+    page.get_by_label("x (mm)").fill("200.0004")
+    page.keyboard.press("Enter")
+    told = "x of b4 is 200.0004 mm, above its maximum of 200.0000 mm"
+    expect(page.locator("#broken")).to_contain_text(told)
+    page.get_by_label("x (mm)").fill("235")
+    page.keyboard.press("Enter")
     page.get_by_label("x (mm)").fill("1,234.5")
     page.keyboard.press("Enter")
     expect(page.locator("#message")).to_contain_text("“1,234.5” is no length")

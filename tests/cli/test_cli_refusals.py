@@ -46,6 +46,7 @@ screenshot --size 1280*800 | --size
 screenshot --size 800x8193 | --size
 screenshot --view below | isometric
 forces --load 1 2 | --load needs a force fx fy fz
+forces --payload 1000000.0000001 | exceed 1e+06 in size; got 1000000.0000001
 forces --payload -1 | --payload must be a number of at least 0; got -1
 forces --most 0 | 6 positive numbers
 accuracy --errors -1 | actuators.error_mm must not be negative; got -1
@@ -79,6 +80,8 @@ path --to 12 8 7 --load 1 2 | and may go on with a moment
 path --to 12 8 7 --load 0 0 -1 | limits neither its actuators
 orientation --torsion nan | --torsion must be a finite number; got nan
 workspace --yaw-range 5 -5 | yaw: the low end 5° exceeds the high end -5°
+workspace --yaw-range 5.0000001 5 | yaw: the low end 5.0000001° exceeds the high end 5°
+workspace --tilt 180.0000001 | within 0° to 180°; got 180.0000001°
 workspace --step 0.01 | at most 50,000,000 are counted
 workspace --tolerance 1e-6 | at most 2,000,000 are made
 workspace --tilt 200 | within 0° to 180°; got 200°
@@ -89,6 +92,7 @@ optimise | --target-volume
 optimise --target-volume 9 --bounds a3x=5:3 | bounds of a3x cross
 optimise --target-volume 9 --bounds a3x=5:nan | must be a finite number; got nan
 optimise --target-volume 9 --bounds a3x=20:30 | outside its bounds 20 to 30
+optimise --target-volume 9 --bounds a3x=19.1829001:30 | 19.1829, outside its bounds 19.1829001
 optimise --target-volume 9 --bounds a3x | NAME=LOW:HIGH
 optimise --target-volume 9 --bounds | needs at least one value
 optimise --target-volume 9 --free width | no variable 'width'

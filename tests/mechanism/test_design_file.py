@@ -89,6 +89,7 @@ def test_file_with_unusable_field_is_refused_by_its_name(
     ("limits", "words"),
     [
         ({"l1": [5, 1]}, "limits.l1"),
+        ({"l1": [5.00000001, 5]}, "limits.l1: the minimum 5.00000001 exceeds the maximum 5"),
         ({"l1": 5.0}, "limits.l1"),
         ({"d2": [-1, 1]}, "limits.d2 minimum"),
         ({"d2": [1, 2, 3]}, "limits.d2"),
@@ -96,6 +97,7 @@ def test_file_with_unusable_field_is_refused_by_its_name(
         *(({"guide": guide}, "limits.guide") for guide in ([5, 1], [1, 2, 3], 5.0)),
         *(({"gap": gap}, "limits.gap") for gap in (-1, None, "wide", 1e41)),
         ({"box": [[0, 9, 0], [1, 1, 1]]}, "limits.box y"),
+        ({"guide": [1.00000001, 1]}, "limits.guide: the low end 1.00000001 exceeds the high"),
         ({"box": [0, 0, 0, 1, 1, 1]}, "limits.box"),
         *(({"box": [low, [1, 1]]}, "limits.box") for low in ([0, 0], [0, 0, 0])),
         ({"margin": -1}, "limits.margin"),

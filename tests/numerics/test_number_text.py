@@ -17,7 +17,9 @@ from explorer.cli.output import degrees, figures
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import (
+    Unit,
     drop_rounding,
+    format_apart,
     format_ascii,
     format_column,
     format_decimals,
@@ -108,6 +110,21 @@ def test_number_text_for_people_is_the_number_to_its_digits(value: float, digits
     whole, _, decimals = text.partition(" ×")[0].lstrip("−").partition(".")
     assert re.fullmatch(r"\d{1,3}(,\d{3})*", whole)
     assert not decimals.endswith("0")
+
+
+@given(numbers, st.floats(-1e-3, 1e-3), st.integers(1, 8), st.sampled_from([1.0, 25.4, 0.1]))
+def test_numbers_apart_read_differently_and_have_no_more_digits_than_that_takes(
+    value: float, part: float, digits: int, factor: float
+) -> None:
+    pair = value, value + part * abs(value)
+    for write in (format_ascii, format_number, Unit("mm", factor).text):
+        first, second = format_apart(pair, digits, write)
+        if abs(pair[0] - pair[1]) > 1e-15 * abs(value):
+            assert first != second
+        plain = [write(each, digits) for each in pair]
+        if plain[0] != plain[1]:
+            assert [first, second] == plain
+    assert format_apart((value, value), digits) == [format_ascii(value, digits)] * 2
 
 
 @given(numbers, st.integers(0, 8), st.booleans())

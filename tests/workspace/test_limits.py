@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from typing import Any
 
 import msgspec
@@ -22,7 +23,9 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.margins import signs_of
 from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.number_text import UNITS, Unit
 from explorer.workspace.limits.constraints import Cone, constraints, slacks
+from explorer.workspace.limits.table import demands_of
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import Rules, Violation, poses_are_valid, violations
 
@@ -311,3 +314,25 @@ def test_poses_not_finite_are_refused() -> None:
         poses_are_valid(OPTIMAL, [0.0, math.nan, 1.0], np.eye(3))
     with pytest.raises(InputError, match="end position"):
         moves_are_valid(OPTIMAL, [0.0, 1.0, 1.0], np.eye(3), [0.0, math.nan, 1.0], np.eye(3))
+
+
+@pytest.mark.parametrize("beyond", [1e-4, 1e-7, 1e-9])
+@pytest.mark.parametrize("unit", [None, UNITS, Unit("mm", 7.3)])
+def test_violation_shows_a_value_that_differs_from_its_bound(
+    beyond: float, unit: Unit | None
+) -> None:
+    cones = Swing(a1=40.0, a3=40.0, b1=40.0, b2=40.0, b3=40.0, b4=40.0)
+    every: dict[str, Any] = dict.fromkeys(LENGTHS, (3.0, 20.0))
+    box = ((1.0, -9.0, 1.0), (20.0, 22.0, 18.0))
+    design = limited(
+        OPTIMAL, **every, guide=(0.5, 20.0), gap=0.25, margin=0.7, box=box, swing=cones
+    )
+    every_end = [(demand, end) for demand in demands_of(design) for end in demand.finite_ends()]
+    # A sign alone has no bound to show.
+    ends = [(demand, bound.value, side) for demand, (bound, _, side) in every_end if bound.value]
+    assert len(ends) > 20
+    for demand, bound, side in ends:
+        value = bound + side * beyond
+        words = Violation(demand, value, above=side > 0.0).words(unit).partition(" = ")[2]
+        first, _, second = re.split(r" is (above its maximum|below its minimum) ", words)
+        assert first != second

@@ -15,7 +15,7 @@ from explorer.app.state.state import Folds, GivenFolds, State
 from explorer.errors import InputError
 from explorer.mechanism.folds import FOLDS, pose_of_folds, to_folds
 from explorer.mechanism.margins import MODE_BITS, signs_of
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import format_apart, format_number
 
 HALF_TURN = 180.0
 # Degrees from 0 or 180 up to which a fold is flat but for rounding.
@@ -43,7 +43,7 @@ class SetFold(Action):
         index, value = self.index, self.value
         least = -HALF_TURN if index >= FIRST_FOLD else 0.0
         if index > 0 and not least <= value <= HALF_TURN:
-            low, high, given = (format_number(each, 6) for each in (least, HALF_TURN, value))
+            low, high, given = format_apart((least, HALF_TURN, value), 6, format_number)
             raise InputError(f"{FOLDS[index]} must be {low}° to {high}°; got {given}°")
         folds = with_value(folds_of(state), str(index), value)
         pose = pose_of_folds(folds)

@@ -11,7 +11,7 @@ from explorer.mechanism.configuration import Point
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.checks import STIFFEST, numbers, positive
-from explorer.numerics.number_text import UNITS, Unit, format_number
+from explorer.numerics.number_text import UNITS, Unit, format_apart, format_number
 
 ALUMINIUM = 2700.0
 """Density of aluminium, in kg/m³."""
@@ -74,10 +74,11 @@ class OrientationView:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.range <= 180.0:
-            got = format_number(self.range)
-            raise InputError(f"the tilts must be above 0° and up to 180°; got {got}°")
+            most, got = format_apart((180.0, self.range), 4, format_number)
+            raise InputError(f"the tilts must be above 0° and up to {most}°; got {got}°")
         if not 0.0 <= self.turn <= 180.0:
-            raise InputError(f"the turns must be 0° to 180°; got {format_number(self.turn)}°")
+            low, high, got = format_apart((0.0, 180.0, self.turn), 4, format_number)
+            raise InputError(f"the turns must be {low}° to {high}°; got {got}°")
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ class PrototypeView:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.exploded <= 1.0:
-            raise InputError(f"the exploded view takes 0 to 1; got {format_number(self.exploded)}")
+            low, high, got = format_apart((0.0, 1.0, self.exploded), 4, format_number)
+            raise InputError(f"the exploded view takes {low} to {high}; got {got}")
         positive("the density, in kg/m³,", self.density)
 
 

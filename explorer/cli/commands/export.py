@@ -27,6 +27,7 @@ from explorer.files.writing import check_writable, make_folder, write_whole
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_apart
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.prototype.weights import DENSITY
@@ -172,9 +173,10 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
         part = options.carrying_part(design, home.rotation, command.load, command.tolerance)
         solid = part.solid
         if part.factor is not None:
+            share, _ = format_apart((part.factor, 1.0), 3)
             raise NoAnswerError(
-                f"no position holds the load; the best one found holds {part.factor:.3g} of load "
-                f"and payload, up to the {solid.empty_because[0]}"
+                f"no position holds the load; the best one found holds {share} of load and "
+                f"payload, up to the {solid.empty_because[0]}"
             )
     shift = command.shift(design, home)
     if shift is not None:

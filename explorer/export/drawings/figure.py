@@ -15,7 +15,7 @@ from explorer.export.drawings import mechanism as drawings
 from explorer.export.drawings.markup import coordinate, drawing_style, element
 from explorer.export.drawings.mechanism import Projection
 from explorer.measures.snapshot import Snapshot
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import format_apart, format_number
 
 COLUMN, PAGE = 85.0, 170.0
 """Widths of figures for a column and for a page, in millimetres."""
@@ -53,9 +53,10 @@ def figure_svg(
         NoAnswerError: The eye is among the parts or behind them.
     """
     if not NARROWEST <= width <= WIDEST:
+        least, most, got = format_apart((NARROWEST, WIDEST, width))
         raise InputError(
-            f"a figure is {NARROWEST:g} to {WIDEST:g} mm wide, {COLUMN:g} for a column and "
-            f"{PAGE:g} for a page; got {width:g}"
+            f"a figure is {least} to {most} mm wide, {COLUMN:g} for a column and {PAGE:g} for a "
+            f"page; got {got}"
         )
     points, unit_mm = drawings.points_to_show(snapshot), snapshot.design.unit_mm
     if float(view.depth(points).max()) > (1.0 - NEAREST) * view.distance:

@@ -20,6 +20,7 @@ window.startPage = (design) => {
   };
   const HALF = { yaw: 180, pitch: 90, roll: 180, β: 180, ε: 180, φ1: 180, φ2: 180, φ3: 180 };
 
+  const MOST_DECIMALS = 15;
   const write = (value, places = decimals) => {
     const text = Math.abs(value).toFixed(places);
     return (value < 0 && Number(text) > 0 ? "−" : "") + text;
@@ -215,17 +216,21 @@ window.startPage = (design) => {
   const sentenceOf = ({ index, value, above }) => {
     const { name, unit, low, high, sign } = design.limits[index];
     const factor = unit === "°" ? 1 / DEGREE : 1;
-    const text = (each) =>
-      `${write(factor * each, unit === "°" ? 1 : decimals)}${unit === "°" ? "°" : " mm"}`;
+    const end = above ? high : low;
+    // As many decimals as make the value differ from the end that it is beyond.
+    const differs = (places) => write(factor * value, places) !== write(factor * end, places);
+    let places = unit === "°" ? 1 : decimals;
+    while (places < MOST_DECIMALS && !differs(places)) places += 1;
+    const text = (each) => `${write(factor * each, places)}${unit === "°" ? "°" : " mm"}`;
     if (sign) {
       const wanted = above ? -1 : 1;
       return Math.sign(value) === -wanted
         ? `${name} is ${above ? "positive" : "negative"}, not ${above ? "negative" : "positive"} as at home.`
-        : `${name} is ${text(value)}; its magnitude must be at least ${text(Math.abs(above ? high : low))}.`;
+        : `${name} is ${text(value)}; its magnitude must be at least ${text(Math.abs(end))}.`;
     }
     return above
-      ? `${name} is ${text(value)}, above its maximum of ${text(high)}.`
-      : `${name} is ${text(value)}, below its minimum of ${text(low)}.`;
+      ? `${name} is ${text(value)}, above its maximum of ${text(end)}.`
+      : `${name} is ${text(value)}, below its minimum of ${text(end)}.`;
   };
   const element = (tag, text, className = "") =>
     Object.assign(document.createElement(tag), { textContent: text, className });

@@ -17,7 +17,7 @@ from explorer.legs.clearance import joined_pairs, radii_of_pairs
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.number_text import Unit
+from explorer.numerics.number_text import Unit, format_apart
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.quantities import Demand
 from explorer.workspace.limits.table import by_quantity, demands_of, rows_of
@@ -119,13 +119,18 @@ class Violation:
     def words(self, unit: Unit | None = None) -> str:
         """Return the violation in words, in which lengths have a unit if one is given."""
         demand = self.demand
-        value = demand.text_of(self.value, unit, size=abs(self.bound))
+        size = abs(self.bound)
+        value, bound = format_apart(
+            (self.value, self.bound),
+            4,
+            lambda each, digits: demand.text_of(each, unit, digits=digits, size=size),
+        )
         if demand.is_sign and self.bound == 0.0:
             sign = "negative" if self.above else "positive"
             of = "" if demand.name.endswith(demand.symbol) else f": {demand.symbol}"
             return f"{self.limit}{of} = {value}, but it is {sign} in the home pose"
         relation = "above its maximum" if self.above else "below its minimum"
-        return f"{self.limit} = {value} is {relation} {demand.text_of(self.bound, unit)}"
+        return f"{self.limit} = {value} is {relation} {bound}"
 
 
 def violations(

@@ -27,6 +27,7 @@ from explorer.mechanism.pose import rotation_array, rotation_from_yaw_pitch_roll
 from explorer.numerics import arrays
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.checks import whole
+from explorer.numerics.number_text import format_apart
 from explorer.workspace.limits.quantities import valid_rows
 from explorer.workspace.limits.valid_poses import Rules
 
@@ -57,7 +58,8 @@ def yaw_pitch_roll_range(
     axes: list[FloatArray] = []
     for name, start, end, count in zip(("yaw", "pitch", "roll"), low, high, counts, strict=True):
         if start > end:
-            raise InputError(f"{name}: the low end {start:g}° exceeds the high end {end:g}°")
+            first, last = format_apart((start, end))
+            raise InputError(f"{name}: the low end {first}° exceeds the high end {last}°")
         whole(f"the number of values of {name}", count, 1, MOST_ORIENTATIONS)
         first, last = (start, end) if count > 1 else (0.5 * (start + end), 0.0)
         axes.append(np.asarray(np.linspace(first, last, count), dtype=np.float64))
@@ -82,7 +84,8 @@ def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> Fl
     """
     untilted = rotation_array(rotation)
     if not 0.0 <= half_angle <= 180.0:
-        raise InputError(f"the half-angle of tilts must lie within 0° to 180°; got {half_angle:g}°")
+        most, got = format_apart((180.0, half_angle))
+        raise InputError(f"the half-angle of tilts must lie within 0° to {most}°; got {got}°")
     whole("the number of orientations", count, 1, MOST_ORIENTATIONS)
     share = np.arange(count) / max(1, count - 1)
     # The area of a spherical cap grows with 1 - cos of the tilt.

@@ -27,7 +27,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.errors import InputError, NoAnswerError
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_decimals, format_number
+from explorer.numerics.number_text import format_apart, format_decimals, format_number
 from explorer.singularity.colours import Rgb
 
 # Messages outside the tree of the scene that go into the file.
@@ -175,9 +175,8 @@ def picture_size(client: viser.ClientHandle, size: tuple[float, float] | float) 
         return width, height
     for name, value in zip(("width", "height"), size, strict=True):
         if not (math.isfinite(value) and LEAST <= value <= MOST):
-            raise InputError(
-                f"the {name} of a picture is {LEAST} to {MOST} pixels; got {format_number(value)}"
-            )
+            least, most, got = format_apart((LEAST, MOST, value), 4, format_number)
+            raise InputError(f"the {name} of a picture is {least} to {most} pixels; got {got}")
     return round(size[0]), round(size[1])
 
 

@@ -11,7 +11,7 @@ from explorer.app.state.actions import Action, Open
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.errors import InputError
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import format_apart, format_number
 
 # Ranges of one axis.
 MOST_RANGES = 16
@@ -94,7 +94,5 @@ def _check_ranges(brush: Brush) -> None:
         raise InputError(f"an axis takes {MOST_RANGES} ranges; {brush.axis} was given {count}")
     for low, high in brush.ranges:
         if not (math.isfinite(low) and math.isfinite(high) and low <= high):
-            raise InputError(
-                f"a range of {brush.axis} goes from low to high; "
-                f"got {format_number(low)} to {format_number(high)}"
-            )
+            got = " to ".join(format_apart((low, high), 4, format_number))
+            raise InputError(f"a range of {brush.axis} goes from low to high; got {got}")

@@ -19,7 +19,7 @@ from explorer.measures.measure import Case
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray
 from explorer.numerics.checks import LONGEST_NAME
-from explorer.numerics.number_text import Unit, format_number
+from explorer.numerics.number_text import Unit, format_apart, format_number
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
 from explorer.sweep import study as sweeps
 from explorer.sweep.machine import MACHINE
@@ -190,7 +190,7 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> sweeps.Study:
         (plan.percent, PERCENTS, "the per cent by which variables vary"),
     ):
         if not ends[0] <= value <= ends[1]:
-            low, high, got = map(format_number, (*ends, value))
+            low, high, got = format_apart((*ends, value), 4, format_number)
             raise InputError(f"{words} must lie within {low} to {high}; got {got}")
     if not plan.variables:
         raise InputError("choose at least one variable that varies")

@@ -20,7 +20,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, triple
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import format_apart, format_number
 from explorer.numerics.search import Watch, ignore_stage
 from explorer.statics.reactions import has_limits
 from explorer.workspace.accessible.nodes import StartError
@@ -151,7 +151,7 @@ def _find_carried(selection: Selection, tolerance: float, _: Watch) -> tuple[Par
     if region.factor >= 1.0:
         return Trouble("the positions that hold it are too few to be drawn")
     (limit,) = region.solid.empty_because
-    percent = format_number(100.0 * region.factor, 3)
+    percent = format_apart((100.0 * region.factor, 100.0), 3, format_number)[0]
     return Trouble(
         f"the best position found holds {percent} % of load and payload; {limit} is at its limit "
         "there"
