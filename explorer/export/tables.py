@@ -18,13 +18,13 @@ from explorer.statics.accuracy import IS_TILT, SOURCES
 from explorer.statics.budget import PARTS, SourceCosts
 
 
-def trajectory_csv(trajectory: Trajectory) -> str:
+def trajectory_csv(trajectory: Trajectory, unit_mm: float | None = None) -> str:
     """Return a trajectory as CSV: a header, then a line per sample.
 
-    The header has the unit of each length, such as "l1 [10 mm]". Numbers round-trip to the
-    last bit.
+    The header has the unit of each length, given in millimetres; None for the design unit, such as
+    "l1 [10 mm]", in which numbers round-trip to the last bit.
     """
-    head, columns = _columns(trajectory, trajectory.unit_mm)
+    head, columns = _columns(trajectory, unit_mm or trajectory.unit_mm)
     return _csv(head, np.column_stack(columns).tolist())
 
 

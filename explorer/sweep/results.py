@@ -6,8 +6,9 @@ The front has the designs that no other beats in one objective without being wor
 from __future__ import annotations
 
 import io
+import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,16 @@ from numpy.typing import NDArray
 
 from explorer.errors import InputError
 from explorer.files.extras import load_extra
+from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.number_text import UNITS, Unit
+from explorer.optimise.outcome import GOALS
+from explorer.optimise.problem import YAW
+from explorer.sweep.machine import MACHINE
 from explorer.sweep.parts import pyarrow, sound_parts, stray_paths, words_of_paths
-from explorer.sweep.rows import Kind, Value, columns_of, design_of
-from explorer.sweep.study import Objective, Study
+from explorer.sweep.rows import SAMPLE, Kind, Value, columns_of, design_of
+from explorer.sweep.study import NAMES, Objective, Study
 
 
 def costs(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> FloatArray:
@@ -160,17 +166,50 @@ def load_results(folder: str | Path, study: Study | None = None) -> Results:
     return Results(known, columns)
 
 
-def table_bytes(results: Results, *, is_csv: bool) -> bytes:
-    """Return all rows as CSV or as Parquet; a number that a row lacks is empty or null.
+def parquet_bytes(results: Results) -> bytes:
+    """Return all rows as Parquet, in design units; a number that a row lacks is null.
 
     Raises:
         MissingExtraError: Pyarrow is not installed.
     """
-    arrow, csv = load_extra("study", "pyarrow", "pyarrow.csv")
-    pairs = results.columns.items()
-    rows = arrow.table({name: arrow.array(each, from_pandas=True) for name, each in pairs})
-    data = io.BytesIO()
-    (csv.write_csv if is_csv else pyarrow().parquet.write_table)(rows, data)
+    return _table_bytes(results.columns, pyarrow().parquet.write_table)
+
+
+def csv_bytes(results: Results, lengths: Unit) -> bytes:
+    """Return all rows as CSV, given the unit of lengths; a number that a row lacks is empty.
+
+    The header has the unit of each column that has one, such as "volume [mm³]".
+
+    Raises:
+        MissingExtraError: Pyarrow is not installed.
+    """
+    polish, columns = results.study.polish, dict[str, Column]()
+    # F = |1 − V / V′| is a plain number.
+    goals: dict[str, str] = {**GOALS, "match-volume": ""}
+    goal = "" if polish is None else goals[polish.objective]
+    for name, values in results.columns.items():
+        unit = unit_of(goal if name == "objective" else name.removeprefix(SAMPLE), lengths)
+        head = f"{name} [{unit.name}]" if unit.name else name
+        columns[head] = values if unit.factor == 1.0 else unit.factor * values
+    (csv,) = load_extra("study", "pyarrow.csv")
+    return _table_bytes(columns, csv.write_csv)
+
+
+def unit_of(name: str, lengths: Unit) -> Unit:
+    """Return the unit of a variable or measure, given that of lengths; "" for a plain number."""
+    if name in CATALOGUE:
+        return CATALOGUE[name].unit_in(lengths, math.inf)
+    if name in MACHINE and MACHINE[name].unit != UNITS.name:
+        return Unit(MACHINE[name].unit, 1.0)
+    if name in NAMES and name != YAW:
+        return lengths
+    return Unit("°" if name == YAW else "", 1.0)
+
+
+def _table_bytes(columns: Mapping[str, Column], write: Callable[[Any, io.BytesIO], None]) -> bytes:
+    (arrow,) = load_extra("study", "pyarrow")
+    pairs, data = columns.items(), io.BytesIO()
+    write(arrow.table({name: arrow.array(each, from_pandas=True) for name, each in pairs}), data)
     return data.getvalue()
 
 

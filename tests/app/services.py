@@ -71,14 +71,19 @@ class StubWorker(Worker):
 
 
 class StubDownloads(Downloads):
-    """Downloads that are kept as pairs of a client and the name of a file, or what is made."""
+    """Downloads that are kept as pairs of a client and the name of a file, or what is made.
+
+    The last one that is sent as it is stays as `data`.
+    """
+
+    data = b""
 
     def __init__(self, server: viser.ViserServer, worker: Worker) -> None:
         super().__init__(server, worker, _ignore)
         self.sent: list[tuple[Who, str]] = []
 
     def send(self, who: Who, name: str, data: bytes) -> None:
-        del data
+        self.data = data
         self.sent.append((who, name))
 
     def compute(

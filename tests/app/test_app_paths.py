@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import signal
 import time
@@ -394,6 +396,15 @@ def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) ->
     desk.press(buttons, "paths.export")
     assert isinstance(services.downloads, StubDownloads)
     assert services.downloads.sent == [(1, "paper-optimal-path.csv")]
+    # Its lengths are in the unit that the page shows.
+    course = journey_of(desk.state).trajectory
+    for lengths, unit, factor in (("mm", "mm", 10.0), ("design units", "10 mm", 1.0)):
+        desk.session.do(Set("view.lengths", lengths))
+        desk.press(buttons, "paths.export")
+        rows = list(csv.DictReader(io.StringIO(services.downloads.data.decode())))
+        assert [float(row[f"l1 [{unit}]"]) for row in rows] == pytest.approx(
+            factor * course.joints[:, 0], rel=1e-15
+        )
     desk.press(buttons, "paths.clear")
     assert desk.state.journey is None
     desk.press(buttons, "paths.kind", "planned")

@@ -6,6 +6,7 @@ import functools
 import importlib
 import io
 import json
+import math
 import multiprocessing
 import os
 import random
@@ -31,10 +32,11 @@ from sweep_faults import DEADLY, HereWorkers, broken, deadly, foreign
 import explorer
 from explorer import InputError, workspace_volume
 from explorer.errors import MissingExtraError
+from explorer.numerics.number_text import UNITS, Unit
 from explorer.sweep import run as runs
 from explorer.sweep.cluster import DaskWorkers
 from explorer.sweep.parts import LOCK_FILE, part_path, part_paths, read_part
-from explorer.sweep.results import front, load_results, summarise, table_bytes
+from explorer.sweep.results import Results, csv_bytes, front, load_results, parquet_bytes, summarise
 from explorer.sweep.rows import columns_of, samples
 from explorer.sweep.run import Progress, RunError, run_study
 from explorer.sweep.study import Objective, Polish, Sampling, Study, encode_study
@@ -287,15 +289,52 @@ def test_folder_with_only_damaged_parts_names_them(tmp_path: Path) -> None:
 def test_table_of_results_has_the_value_of_each_row_and_column(whole: Path, name: str) -> None:
     polars: Any = importlib.import_module("polars")
     results = load_results(whole)
-    data = io.BytesIO(table_bytes(results, is_csv=name == "csv"))
-    table = polars.read_csv(data) if name == "csv" else polars.read_parquet(data)
-    assert table.columns == [*results.columns]
+    is_csv = name == "csv"
+    data = io.BytesIO(csv_bytes(results, UNITS) if is_csv else parquet_bytes(results))
+    table = polars.read_csv(data) if is_csv else polars.read_parquet(data)
+    heads = [head.partition(" [")[0] for head in table.columns] if is_csv else table.columns
+    assert heads == [*results.columns]
+    table.columns = heads
     for column, values in results.columns.items():
         # A number that a row lacks is NaN here and nothing there.
         lacks = [str(each) in ("nan", "") for each in values.tolist()]
         assert [each in (None, "") for each in table[column]] == lacks
         there = [each for each in table[column] if each not in (None, "")]
         assert there == values[~np.array(lacks)].tolist()
+
+
+@pytest.mark.parametrize("lengths", [UNITS, STUDY.base.millimetres])
+def test_csv_of_results_has_the_unit_of_each_column_in_its_header(lengths: Unit) -> None:
+    polars: Any = importlib.import_module("polars")
+    ranges = dict.fromkeys(("yaw", "b2", "radius", "tool_x", "payload_mass"), (1.0, 3.0))
+    polished = {"yaw": (1.0, 3.0), "b2": (1.0, 3.0)}
+    study = msgspec.structs.replace(
+        STUDY,
+        variables=ranges,
+        measures=("volume", "home_worst_turn", "inverse_condition"),
+        objectives=(),
+        polish=Polish(objective="smallest-reach", variables=polished),
+    )
+    kinds = columns_of(study)
+    columns = {name: np.array([2.0 if kind == "float64" else 1]) for name, kind in kinds.items()}
+    table = polars.read_csv(io.BytesIO(csv_bytes(Results(study, columns), lengths)))
+    unit, size = lengths.name, 2.0 * lengths.factor
+    of_lengths = ("sample_b2", "sample_radius", "sample_tool_x", "b2", "radius", "tool_x")
+    volume = lengths.to_power(3, math.inf)
+    expected = {
+        **{f"{name} [{unit}]": size for name in (*of_lengths, "objective")},
+        f"volume [{volume.name}]": 2.0 * volume.factor,
+        **dict.fromkeys(("sample_yaw [°]", "yaw [°]", "home_worst_turn [°]"), 2.0),
+        **dict.fromkeys(("sample_payload_mass [kg]", "payload_mass [kg]"), 2.0),
+        "inverse_condition": 2.0,
+    }
+    names = [name.partition(" [")[0] for name in table.columns]
+    assert names == [*kinds]
+    found = {name: table[name][0] for name in table.columns}
+    assert {name: found[name] for name in expected} == pytest.approx(expected)
+    assert found.keys() - expected.keys() == {
+        *("index", "iterations", "converged", "status", "reason")
+    }
 
 
 def test_folder_in_use_is_refused(tmp_path: Path) -> None:

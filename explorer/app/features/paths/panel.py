@@ -203,9 +203,11 @@ class PathsPanel:
         return numbers
 
     def _export(self, _: str, client: viser.ClientHandle) -> None:
-        journey = self._session.state.journey
+        state = self._session.latest_state()
+        journey = state.journey
         if journey is not None:
-            data = trajectory_csv(journey.trajectory).encode()
+            unit_mm = 1.0 if state.view.lengths == "mm" else None
+            data = trajectory_csv(journey.trajectory, unit_mm).encode()
             self._downloads.send(client.client_id, f"{journey.design.name}-path.csv", data)
 
 

@@ -46,7 +46,7 @@ from explorer.errors import ExplorerError
 from explorer.files.extras import check_extra, is_missing
 from explorer.measures.catalogue import measures_in
 from explorer.numerics.number_text import format_number
-from explorer.sweep.results import load_results, table_bytes
+from explorer.sweep.results import csv_bytes, load_results, parquet_bytes
 from explorer.sweep.study import NAMES, decode_study
 
 Axis = Literal["across", "up", "colour"]
@@ -325,11 +325,14 @@ def open_study(services: Services, data: bytes, name: str) -> tuple[Action, str]
 
 def send_table(services: Services, name: str, who: Who) -> None:
     """Send the rows of the open study."""
-    study = str(Studies.of(services.session.latest_state()).name)
+    state = services.session.latest_state()
+    study = str(Studies.of(state).name)
 
     def make(_: viser.ClientHandle) -> File:
         results = load_results(services.get(study_folders).folder(study))
-        return f"{study}.{name.lower()}", table_bytes(results, is_csv=name == "CSV")
+        if name == "Parquet":
+            return f"{study}.parquet", parquet_bytes(results)
+        return f"{study}.csv", csv_bytes(results, state.view.unit_for(results.study.base))
 
     services.downloads.make(who, "Writing the table", make)
 

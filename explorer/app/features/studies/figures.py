@@ -21,7 +21,7 @@ from explorer.app.widgets.markup import by_theme, reading
 from explorer.export.drawings.mechanism import round_length
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.number_text import Unit, format_number
-from explorer.sweep.results import Results
+from explorer.sweep.results import Results, unit_of
 
 PlotName = Literal["lines", "points"]
 """Name of a plot: each design as a line over all axes, or as a point over two of them."""
@@ -142,7 +142,7 @@ class PlotRows:
 
     def unit_of(self, name: str) -> Unit:
         """Return the unit in which the values of an axis are written."""
-        return state.unit_of(name, self.lengths)
+        return unit_of(name, self.lengths)
 
     def title_of(self, name: str) -> str:
         """Return the title of an axis as HTML."""

@@ -5,7 +5,6 @@ A study is known by its name, not by its folder: only the server knows the folde
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -23,6 +22,7 @@ from explorer.numerics.number_text import Unit, format_apart, format_number
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
 from explorer.sweep import study as sweeps
 from explorer.sweep.machine import MACHINE
+from explorer.sweep.results import unit_of
 
 Range: TypeAlias = tuple[float, float]
 
@@ -209,15 +209,6 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> sweeps.Study:
         objectives=tuple(sweeps.Objective(measure, sense) for measure, sense in plan.objectives),
         chunk=max(4, -(-plan.count // PARTS)),
     )
-
-
-def unit_of(name: str, lengths: Unit) -> Unit:
-    """Return the unit of a variable or measure, given that of lengths; "" for a plain number."""
-    if name in CATALOGUE:
-        return CATALOGUE[name].unit_in(lengths, math.inf)
-    if name in sweeps.NAMES and name != YAW and name not in MACHINE:
-        return lengths
-    return Unit("°" if name == YAW else MACHINE[name].unit if name in MACHINE else "", 1.0)
 
 
 def choices_for(design: Design, plan: StudyPlan) -> tuple[list[str], list[str]]:

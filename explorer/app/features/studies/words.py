@@ -9,7 +9,7 @@ import numpy as np
 
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.figures import FRONT, MOST_ROWS, PICKED, SCALE
-from explorer.app.features.studies.state import StudyPlan, choices_for, label_of, title_of, unit_of
+from explorer.app.features.studies.state import StudyPlan, choices_for, label_of, title_of
 from explorer.app.features.studies.work import StudyRun
 from explorer.app.widgets.buttons import extra_button, press_button
 from explorer.app.widgets.markup import box, dim, meter
@@ -20,6 +20,7 @@ from explorer.numerics.arrays import IntArray
 from explorer.numerics.number_text import Unit, decimals_for, format_decimals, format_number
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.machine import MACHINE
+from explorer.sweep.results import unit_of
 from explorer.sweep.study import NAMES, RADIUS, Sense, Study
 
 ROWS = 10
@@ -327,7 +328,10 @@ def _variable_words(name: str, lengths: Unit) -> str:
         YAW: "the yaw of home [°]",
         REACH: f"one maximum for all lengths [{lengths.name}]",
         RADIUS: f"one radius for all legs [{lengths.name}]",
-        **{other: f"the {each.words} [{each.unit}]" for other, each in MACHINE.items()},
+        **{
+            other: f"the {each.words} [{unit_of(other, lengths).name}]"
+            for other, each in MACHINE.items()
+        },
     }
     return words.get(name, title_of(name, lengths)) if name in NAMES else name
 
