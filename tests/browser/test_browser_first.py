@@ -35,8 +35,23 @@ COVERED = """() => {
     const { right, bottom } = document.querySelector("canvas").getBoundingClientRect();
     return !!document.elementFromPoint(right - 20, bottom - 8).closest(".mantine-Paper-root");
 }"""
-# Windows of a small laptop, half a screen, and a phone, with the figures that they show at least.
-WINDOWS = {(1000, 700): 3, (820, 600): 2, (390, 844): 1}
+# Names of the buttons of the bar and of the views, and of the tabs, whose middle a pointer finds.
+FOUND = """() => [...document.querySelectorAll(".ex-bar button, [role=tab]")].flatMap((each) => {
+    const { x, y, width, height } = each.getBoundingClientRect();
+    const found = document.elementFromPoint(x + width / 2, y + height / 2);
+    const name = each.ariaLabel || each.textContent.trim();
+    return each.contains(found) ? [name.split(" ")[0]] : [];
+})"""
+# Windows of a small laptop, half a screen, two laptops that enlarge all to 200 %, and a phone, with
+# the figures that they show at least.
+PHONE = (390, 844)
+WINDOWS = {(1000, 700): 3, (820, 600): 2, (683, 384): 2, (640, 360): 1, PHONE: 1}
+REACHED = {
+    *("Undo", "Redo", "History", "Export", "Search", "Theme", "Help"),
+    *("Isometric", "Front", "Side", "Top", "Fit", "Overlays"),
+    *("Pose", "Design", "Machine"),
+    *("Singularity", "Workspace", "Tilt", "Loads", "Prototype"),
+}
 HIGHER = Pose((10.0, 5.0, 11.0), PRESETS["paper-optimal"].home_pose.quaternion)
 
 
@@ -67,7 +82,7 @@ def test_first_screen_is_short_for_the_keyboard_and_stays_as_it_was_opened(
         expect(strata.first).to_be_visible()
 
 
-def test_bar_of_any_window_shows_the_verdict_and_cuts_no_figure(
+def test_bar_of_any_window_shows_the_verdict_and_all_buttons_and_cuts_no_figure(
     browser: Browser, running: Running
 ) -> None:
     with closing(Tab(browser, running)) as tab:
@@ -78,13 +93,14 @@ def test_bar_of_any_window_shows_the_verdict_and_cuts_no_figure(
             assert all(parts in ([True] * 3, ["hidden"] * 3) for _, parts in figures), figures
             assert "Nearest singular pose\n1.03 units of motion" in shown
             assert len(shown) >= least
+            # A phone has a list of the panels instead of tabs, which opens what the bar leaves out.
+            assert size == PHONE or set(tab.page.evaluate(FOUND)) >= REACHED, size
             expect(tab.page.locator("[data-document]")).to_be_in_viewport(ratio=1.0)
         # On a phone, the last of the windows, the panels are below the scene.
         tab.wait_for(lambda: not tab.page.evaluate(COVERED), "a scene that no panel covers")
 
 
 def test_charts_of_a_path_are_no_wider_than_a_phone(browser: Browser, running: Running) -> None:
-    phone = min(WINDOWS)
     for path, value in (
         ("design.actuators.speed_mm_s", (200.0,) * 6),
         ("paths.goal", HIGHER),
@@ -93,7 +109,7 @@ def test_charts_of_a_path_are_no_wider_than_a_phone(browser: Browser, running: R
         running.page.session.do(Set(path, value))
     running.page.session.do(Go())
     with closing(Tab(browser, running)) as tab:
-        tab.resize(phone)
+        tab.resize(PHONE)
         tab.page.get_by_text(re.compile("^Optimise · ")).click()
         tab.page.get_by_role("tab", name="Paths").click()
         charts = tab.page.locator(".uplot:visible")
@@ -101,4 +117,4 @@ def test_charts_of_a_path_are_no_wider_than_a_phone(browser: Browser, running: R
         expect(tab.page.locator(".ex-drives")).to_be_visible()
         tab.settle()
         boxes = [chart.bounding_box() for chart in charts.all()]
-        assert all(box and box["width"] < phone[0] for box in boxes), boxes
+        assert all(box and box["width"] < PHONE[0] for box in boxes), boxes
