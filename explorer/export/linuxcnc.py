@@ -20,7 +20,7 @@ from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.valid_poses import poses_are_valid, violations
+from explorer.workspace.limits.valid_poses import violations
 
 LINUXCNC_FILES = (
     *("README.txt", "flagged44.ini", "flagged44.hal", "flagged44.tbl"),
@@ -142,14 +142,13 @@ def _check_home(design: Design) -> None:
             "LinuxCNC begins in the home pose, which is singular, so that no assembly mode is its "
             "own; choose another home pose"
         )
-    if poses_are_valid(design, pose.position, pose.rotation):
-        return
-    at = Configuration(design, pose.position, pose.rotation)
-    broken = [each.words(design.millimetres) for each in violations(at)[0]]
-    raise NoAnswerError(
-        f"LinuxCNC begins in the home pose, which breaks limits: "
-        f"{'; '.join(broken) or 'its legs collide'}. Choose a home pose within the limits"
-    )
+    (broken,) = violations(Configuration.at(design, pose))
+    if broken:
+        words = "; ".join(each.words(design.millimetres) for each in broken)
+        raise NoAnswerError(
+            f"LinuxCNC begins in the home pose, which breaks limits: {words}. Choose a home pose "
+            "within the limits"
+        )
 
 
 def _number(value: float) -> str:

@@ -35,7 +35,7 @@ from explorer.mechanism.pose import (
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.checks import STIFFEST, size_problem
-from explorer.workspace.limits.valid_poses import sides_of_limits
+from explorer.workspace.limits.valid_poses import COLLISIONS, colliding_pairs, sides_of_limits
 
 MOST_BYTES = 100_000_000
 """Largest size of a table."""
@@ -339,13 +339,15 @@ def _answer(
 def _verdicts(poses: Configuration) -> tuple[list[str], IntArray, IntArray]:
     """Return the sets of limits that poses violate, in words, and the set and its size of each.
 
-    The words are the names of the limits in the order of the design file. The indices of the sets
-    and their sizes have the shape (m,).
+    The words are the names of the limits in the order of the design file, and of pairs of legs
+    that collide. The indices of the sets and their sizes have the shape (m,).
     """
     demands, _, sides = sides_of_limits(poses)
-    ends = np.array([demand.end_names() for demand in demands]).reshape(-1, 2)
+    pairs = zip(COLLISIONS, COLLISIONS, strict=True)
+    ends = np.array([*(demand.end_names() for demand in demands), *pairs])
+    sides = np.hstack([sides, colliding_pairs(poses)])
     # Poses violate few of all sets of limits, each a number in balanced ternary digits.
-    numbers = sides @ 3 ** np.arange(len(demands))
+    numbers = sides @ 3 ** np.arange(len(ends))
     _, first, kind = np.unique(numbers, return_index=True, return_inverse=True)
     words = ["; ".join(ends[side != 0, (side[side != 0] > 0) * 1]) for side in sides[first]]
     return words, kind, np.count_nonzero(sides, axis=1)

@@ -29,7 +29,7 @@ from explorer.singularity.nearest import (
 )
 from explorer.singularity.strata import GENERIC, incidences, inversions, stratum_of
 from explorer.statics.forces import twists_of_actuators
-from explorer.workspace.limits.valid_poses import Violation, violations
+from explorer.workspace.limits.valid_poses import Collision, Violation, violations
 
 
 class PoseIndices(Configuration):
@@ -177,13 +177,13 @@ class Snapshot(PoseIndices):
         return float(np.abs(self.margins).min()) / self.design.reach
 
     @cached_property
-    def violations(self) -> tuple[Violation, ...]:
-        """The limits that the pose breaks."""
+    def violations(self) -> tuple[Violation | Collision, ...]:
+        """The limits that the pose breaks, and the legs that collide in it."""
         return violations(self)[0]
 
     @cached_property
-    def mode_violations(self) -> tuple[tuple[Violation, ...], ...]:
-        """The limits that each of the eight assembly modes breaks."""
+    def mode_violations(self) -> tuple[tuple[Violation | Collision, ...], ...]:
+        """The limits that each of the eight assembly modes breaks, and the legs that collide."""
         return tuple(violations(self.modes))
 
     @cached_property

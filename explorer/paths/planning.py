@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError, NoAnswerError
-from explorer.legs.clearance import PAIRS
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import JOINTS, Design
@@ -196,11 +195,6 @@ def _check_ends(start: Snapshot, goal: Snapshot, load: DemandedLoad | None) -> N
     for name, end in named.items():
         # `_check_same_order` compares the order of the carriages at both ends.
         broken = [str(violation) for violation in violations(end, start.signs, order=0)[0]]
-        clearances = end.clearances.clearance.tolist()
-        for (first, second), value in zip(PAIRS, clearances, strict=True):
-            if not value > 0.0:
-                number = f"{value:.4g}".replace("-", "−")
-                broken.append(f"legs {first} and {second} collide (clearance {number})")
         if broken:
             raise InputError(f"the {name} is outside the limits: {'; '.join(broken)}")
         if load is not None:

@@ -259,6 +259,14 @@ def test_pose_within_the_limits_looks_safe_unless_it_is_singular() -> None:
             assert ("ex-within" in html) == (state == regular)
 
 
+def test_page_counts_colliding_legs_among_the_broken_limits() -> None:
+    frame = Frame(open_state(OPTIMAL.with_limits(leg_radii=(0.4, 0.4, 0.4, 0.4))))
+    assert plain(limits_figure(frame)) == "Limits 1 broken"
+    assert "legs 2 and 3 overlap by 1.306 mm" in limits_figure(frame)
+    assert "legs 2 and 3 overlap by 1.306 mm" in modes.present_mode(frame)
+    assert rows_of_modes(frame)[frame.state.mode][5] == "legs 2–3"
+
+
 @pytest.fixture
 def still_clock() -> Generator[None]:
     """A clock that stands all but still unless it is advanced."""

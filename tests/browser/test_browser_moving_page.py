@@ -15,11 +15,10 @@ from playwright.sync_api import Browser, Page, expect
 
 from explorer import PRESETS, Design, forward, from_folds, inverse, margins, to_folds
 from explorer.export.moving_page import NAMES, moving_page
-from explorer.legs.clearance import leg_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.valid_poses import violations
+from explorer.workspace.limits.valid_poses import COLLISIONS, violations
 
 OPTIMAL = PRESETS["paper-optimal"]
 SHARE, COUNT = 1e-12, 500
@@ -59,11 +58,10 @@ def limits_in_python(design: Design, position: FloatArray, rotation: FloatArray)
     """Return what each pose breaks, in the words of the page."""
     words = {f"margin δ{k}": f"δ{k}" for k in (1, 2, 3)} | {f"box {x}": f"{x} of b4" for x in "xyz"}
     words |= {"gap |d1 − d3|": "|d1 − d3|", "carriage order": "d3 − d1"}
-    at = Configuration(design, position, rotation)
+    words |= dict.fromkeys(COLLISIONS, "collision")
     return [
         {words.get(each.limit, each.limit.replace("swing", "Swing at")) for each in broken}
-        | ({"collision"} if (clearances <= 0.0).any() else set())
-        for broken, clearances in zip(violations(at), leg_clearances(at).clearance, strict=True)
+        for broken in violations(Configuration(design, position, rotation))
     ]
 
 

@@ -14,6 +14,7 @@ import explorer
 from explorer.errors import InputError
 from explorer.export import pose_tables as tables
 from explorer.export.tables import trajectory_csv
+from explorer.legs.clearance import leg_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
@@ -123,6 +124,33 @@ def test_poses_of_the_tool_are_those_of_b4_beside_it(tmp_path: Path, cli: Comman
         for axis, value in zip("xyz", place, strict=True):
             assert float(row[f"tool_{axis} [25.4 mm]"]) == pytest.approx(value, abs=1e-12)
         assert (row["within_limits"] == "true") is one["within_limits"]
+
+
+def test_command_and_table_count_colliding_legs_among_the_limits(
+    tmp_path: Path, cli: CommandLine
+) -> None:
+    design = PRESET.with_limits(leg_radii=(0.3, 0.5, 0.2, 0.4))
+    poses, out = tmp_path / "poses.csv", tmp_path / "out.csv"
+    position, angles = random_poses(60)
+    position[0], angles[0] = HOME.position, (-80.0, 0.0, 0.0)
+    lines = [",".join(map(repr, row)) for row in np.hstack([position, angles]).tolist()]
+    poses.write_text("\n".join(["x,y,z,yaw,pitch,roll", *lines]), encoding="utf-8")
+    cli.run("inverse", "--design", design, "--poses", poses, "--out", out)
+    with out.open(encoding="utf-8", newline="") as stream:
+        rows = [*csv.DictReader(stream)]
+    at = Configuration(design, position, rotation_from_yaw_pitch_roll(angles))
+    valid = explorer.poses_are_valid(design, at.position, at.rotation).tolist()
+    assert [row["within_limits"] == "true" for row in rows] == valid
+    collides = (leg_clearances(at).clearance <= 0.0).any(axis=-1).tolist()
+    assert ["legs" in row["violations"] for row in rows] == collides
+    assert rows[0]["violations"] == "legs 2–3"
+    for place, turn, is_valid in [*zip(position.tolist(), angles.tolist(), valid, strict=True)][:5]:
+        at_pose = "--position", *place, "--yaw-pitch-roll", *turn
+        for command in ("inverse", "interference"):
+            one = cli.answer(command, "--design", design, *at_pose)
+            assert one["within_limits"] is is_valid
+    text = cli.text("inverse", "--design", design, "--yaw-pitch-roll", -80, 0, 0)
+    assert "outside the limits:\n  legs 2 and 3 overlap by 0.3001" in text
 
 
 def test_joints_that_do_not_close_are_told_and_the_others_answered(

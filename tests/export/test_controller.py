@@ -18,7 +18,7 @@ from reference import read_reference
 
 from explorer import PRESETS, Design, forward, inverse, jacobian, margins, to_folds
 from explorer.export.controller import LIMIT_NAMES, kernel_files
-from explorer.legs.clearance import PAIRS, leg_clearances
+from explorer.legs.clearance import PAIRS
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray, IntArray
@@ -38,6 +38,7 @@ BITS = {
     **{f"margin δ{index}": f"DELTA{index}" for index in (1, 2, 3)},
     "gap |d1 − d3|": "GAP",
     "carriage order": "ORDER",
+    **{f"legs {i}–{j}": f"LEGS_{i}{j}" for i, j in PAIRS},
 }
 
 
@@ -75,20 +76,13 @@ def test_kernel_equals_python(seed: int, tmp_path: Path) -> None:
 
 
 def bits_of_python(design: Design, position: FloatArray, rotation: FloatArray) -> IntArray:
-    at = Configuration(design, position, rotation)
-    clearances = leg_clearances(at).clearance
     return np.array(
         [
             sum(
                 1 << LIMIT_NAMES.index(BITS.get(name, name.upper().replace(" ", "_")))
                 for name in {violation.limit for violation in broken}
             )
-            + sum(
-                1 << LIMIT_NAMES.index(f"LEGS_{first}{second}")
-                for (first, second), clearance in zip(PAIRS, of_pairs, strict=True)
-                if clearance <= 0.0
-            )
-            for broken, of_pairs in zip(violations(at), clearances, strict=True)
+            for broken in violations(Configuration(design, position, rotation))
         ]
     )
 

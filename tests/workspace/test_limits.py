@@ -18,16 +18,24 @@ from strategies import Case, ordinary_cases
 from tool_moves import tool_move
 
 from explorer import JOINTS, PRESETS, Design, InputError, Limits, Pose, evaluate, inverse, margins
+from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import poses_between
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Swing
+from explorer.mechanism.folds import from_folds, to_folds
 from explorer.mechanism.margins import signs_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import UNITS, Unit
 from explorer.workspace.limits.constraints import Cone, constraints, slacks
 from explorer.workspace.limits.table import demands_of
 from explorer.workspace.limits.valid_moves import moves_are_valid
-from explorer.workspace.limits.valid_poses import Rules, Violation, poses_are_valid, violations
+from explorer.workspace.limits.valid_poses import (
+    Collision,
+    Rules,
+    Violation,
+    poses_are_valid,
+    violations,
+)
 
 Signs = tuple[int, int, int]
 ANY: dict[str, Any] = dict.fromkeys(LENGTHS, (0.0, 1e6))
@@ -42,8 +50,9 @@ def with_only(design: Design, **limits: Any) -> Design:
 def broken(
     design: Design, position: FloatArray, rotation: FloatArray, signs: Signs | None = None
 ) -> tuple[Violation, ...]:
+    """Return the violations of ranges in one pose."""
     (found,) = violations(Configuration(design, position, rotation), signs)
-    return found
+    return tuple(each for each in found if isinstance(each, Violation))
 
 
 def ranges(low: float, high: float) -> st.SearchStrategy[tuple[float, float]]:
@@ -173,13 +182,6 @@ RADIUS = 0.2
 THICK = limited(OPTIMAL, leg_radii=(RADIUS,) * 4)
 
 
-def verdict_of(design: Design, pose: Pose) -> tuple[bool, float]:
-    """Return whether a pose has no violation and no collision, and its smallest |clearance|."""
-    snapshot = evaluate(design, pose)
-    is_valid = not snapshot.violations and bool((snapshot.clearances.clearance > 0.0).all())
-    return is_valid, float(np.abs(snapshot.clearances.clearance).min())
-
-
 def poses_about(design: Design, seed: int, count: int) -> list[Pose]:
     """Return random poses at distances from near the home to far from it."""
     rng = np.random.default_rng(seed)
@@ -202,16 +204,32 @@ def with_swing(design: Design, seed: int) -> Design:
 
 
 @given(st.integers(0, 2**32))
-def test_pose_without_violations_or_collisions_is_valid(seed: int) -> None:
+def test_pose_is_valid_exactly_if_it_violates_nothing(seed: int) -> None:
     ordinary = ordinary_case(seed)[0]
     designs = troubled_case(seed)[0], ordinary, with_swing(ordinary, seed), THICK
     design = designs[seed % 4]
-    poses = poses_about(design, seed, 6)
-    found = poses_are_valid(design, *arrays_of(poses))
-    for pose, valid in zip(poses, found.tolist(), strict=True):
-        expected, nearness = verdict_of(design, pose)
-        if nearness > 1e-12 * design.reach:
-            assert valid == expected, (design, pose)
+    position, rotation = arrays_of(poses_about(design, seed, 6))
+    # In flat poses all legs are in one plane, where axes cross to rounding.
+    flat = from_folds(to_folds(position, rotation) * [1, 1, 1, 0, 0, 0])
+    position, rotation = np.vstack([position, flat[0]]), np.vstack([rotation, flat[1]])
+    at = Configuration(design, position, rotation)
+    found = violations(at)
+    assert poses_are_valid(design, position, rotation).tolist() == [not broken for broken in found]
+    for broken, clearances in zip(found, leg_clearances(at).clearance.tolist(), strict=True):
+        told = {each.legs: each.depth for each in broken if isinstance(each, Collision)}
+        for pair, clearance in zip(PAIRS, clearances, strict=True):
+            if abs(clearance) > 1e-12 * design.reach:
+                assert (pair in told) == (clearance < 0.0), (design, pair)
+                assert told.get(pair, -clearance) == pytest.approx(-clearance)
+
+
+def test_collision_is_told_with_the_length_of_the_overlap() -> None:
+    (overlap,) = evaluate(limited(OPTIMAL, leg_radii=(0.4,) * 4), OPTIMAL.home_pose).violations
+    assert (overlap.limit, str(overlap)) == ("legs 2–3", "legs 2 and 3 overlap by 0.1306")
+    assert overlap.words(OPTIMAL.millimetres) == "legs 2 and 3 overlap by 1.306 mm"
+    crossing = Pose((8.0, -4.0, 0.0), OPTIMAL.home_pose.quaternion)
+    told = [str(each) for each in evaluate(OPTIMAL, crossing).violations]
+    assert told == ["legs 2 and 4 touch", "legs 3 and 4 touch"]
 
 
 def test_leg_without_a_direction_at_home_violates_its_cone() -> None:
@@ -221,7 +239,7 @@ def test_leg_without_a_direction_at_home_violates_its_cone() -> None:
     pose = OPTIMAL.home_pose
     assert poses_are_valid(free, pose.position, pose.rotation)
     assert not poses_are_valid(design, pose.position, pose.rotation)
-    assert not verdict_of(design, pose)[0]
+    assert evaluate(design, pose).violations
     assert not moves_are_valid(design, pose.position, pose.rotation, pose.position, pose.rotation)
 
 

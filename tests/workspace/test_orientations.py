@@ -18,6 +18,7 @@ from explorer.mechanism.design import LENGTHS, Swing, Triple
 from explorer.mechanism.pose import rotation_array, yaw_pitch_roll_from_rotation
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
+from explorer.workspace.limits.valid_poses import Violation
 from explorer.workspace.orientations.share import (
     cone_of_directions,
     orientation_capability,
@@ -97,6 +98,7 @@ def test_swing_of_a_leg_is_its_angle_to_the_direction_at_home() -> None:
             assert found == ()
             continue
         (violation,) = found
+        assert isinstance(violation, Violation)
         assert violation.limit == "swing a1"
         assert violation.value == pytest.approx(angle, rel=1e-9)
         assert violation.bound == pytest.approx(bound, rel=1e-12)

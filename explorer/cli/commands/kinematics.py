@@ -34,10 +34,11 @@ from explorer.workspace.limits.table import joint_ranges
 class Inverse(options.JsonOptions, options.PoseOptions):
     """Compute the joints of a pose, or of a table of poses.
 
-    Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design are listed. A table is a
-    CSV file with the columns x, y, z (or tool_x, tool_y, tool_z with `--at tool`) and qw, qx, qy,
-    qz, or yaw, pitch, roll, or azimuth, tilt, torsion. A heading may have a unit, such as x_mm,
-    x [10 mm] or yaw_deg; without one it is the design's unit, or degrees.
+    Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design and the legs that collide
+    are listed. A table is a CSV file with the columns x, y, z (or tool_x, tool_y, tool_z with
+    `--at tool`) and qw, qx, qy, qz, or yaw, pitch, roll, or azimuth, tilt, torsion. A heading may
+    have a unit, such as x_mm, x [10 mm] or yaw_deg; without one it is the design's unit, or
+    degrees.
     """
 
     poses: Annotated[Path | None, values.hint("instead of one pose", "FILE.csv")] = None

@@ -192,12 +192,13 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
 
     Its message names the limits or the pairs of legs, and the nearest valid position.
     """
-    if not start_faults(design, rotation, position):
+    (broken,) = violations(Configuration(design, position, rotation))
+    if not broken:
         return
     nearest = nearest_clear_position(design, rotation, position)
 
     def words(unit: Unit | None) -> str:
-        faults = "; ".join(start_faults(design, rotation, position, unit))
+        faults = "; ".join(each.words(unit) for each in broken)
         remedy = "no valid position is found at this orientation"
         if nearest is not None:
             place = _text_of(nearest, unit)
@@ -205,25 +206,6 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
         return f"no position is accessible from {_text_of(position, unit)}: {faults}; {remedy}"
 
     raise StartError(words(None), nearest, words(design.millimetres))
-
-
-def start_faults(
-    design: Design, rotation: FloatArray, position: FloatArray, unit: Unit | None = None
-) -> list[str]:
-    """Return the limits that a position breaks and the pairs of legs that touch there.
-
-    Lengths are in design units, without their name, unless a unit is given.
-    """
-    configuration = Configuration(design, position, rotation)
-    (broken,) = violations(configuration)
-    clearance = leg_clearances(configuration).clearance
-    faults = [violation.words(unit) for violation in broken]
-    for (i, j), depth in zip(PAIRS, (-clearance).tolist(), strict=True):
-        if depth >= 0.0:
-            length = f"{depth:.4g}" if unit is None else unit.text(depth)
-            manner = f"overlap by {length}" if depth > 0.0 else "cross"
-            faults.append(f"legs {i} and {j} {manner}")
-    return faults
 
 
 def _text_of(position: FloatArray, unit: Unit | None) -> str:
@@ -252,7 +234,7 @@ def count_nodes(
     x, y, z = counts.astype(int).tolist()
     surveyed = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
     within = int(surveyed.within.sum())
-    is_valid = not start_faults(design, rotation, start)
+    is_valid = poses_are_valid(design, start, rotation)
     return within, int(surveyed.accessible_from(start).sum()) if is_valid else 0
 
 
@@ -284,7 +266,7 @@ def nearest_clear_position(
     for node in nodes:
         candidate = descend_towards(position, slacks_at, node, reach)
         nearer = np.linalg.norm(candidate - position) < np.linalg.norm(best - position)
-        if nearer and not start_faults(design, rotation, candidate):
+        if nearer and poses_are_valid(design, candidate, rotation):
             best = candidate
     return best
 

@@ -1,7 +1,7 @@
 """Validity of poses: whether they satisfy all demands of a design, and which limits they violate.
 
 The demands are the limits, the home's sign triple and the clearances of all pairs of legs. They
-are tested in compiled loops. `explorer.legs.clearance` names the legs that collide.
+are tested in compiled loops. A pose is valid exactly if it violates nothing.
 """
 
 from __future__ import annotations
@@ -13,11 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.clearance import joined_pairs, radii_of_pairs
+from explorer.legs.clearance import (
+    PAIRS,
+    joined_pairs,
+    leg_clearances,
+    pair_name,
+    radii_of_pairs,
+)
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.number_text import Unit, format_apart
+from explorer.numerics.number_text import Unit, drop_rounding, format_apart, format_number
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.quantities import Demand
 from explorer.workspace.limits.table import by_quantity, demands_of, rows_of
@@ -40,12 +46,9 @@ class Rules(NamedTuple):
         design: Design, signs: tuple[int, int, int] | None = None, order: int | None = None
     ) -> Rules:
         """Return the rules of a design; signs and order as for `demands_of`."""
-        row = np.empty(quantities.GEOMETRY_COLUMNS)
-        row[: quantities.RADII] = design.variables
-        # No clearance is demanded of a pair that shares a joint.
-        row[quantities.RADII :] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
         # What takes the least time comes first, since most invalid poses violate that too.
-        return Rules(row, rows_of(design, by_quantity(demands_of(design, signs, order))))
+        demands = by_quantity(demands_of(design, signs, order))
+        return Rules(geometry_of(design), rows_of(design, demands))
 
     def without_clearances(self) -> Rules:
         """Return rules that demand no clearance."""
@@ -67,6 +70,15 @@ class Rules(NamedTuple):
         low[of_margins & np.isfinite(low) & (low < margin)] = margin
         high[of_margins & np.isfinite(high) & (high > -margin)] = -margin
         return Rules(row, demands)
+
+
+def geometry_of(design: Design) -> FloatArray:
+    """Return the design variables and the sums of radii, shape (GEOMETRY_COLUMNS,)."""
+    row = np.empty(quantities.GEOMETRY_COLUMNS)
+    row[: quantities.RADII] = design.variables
+    # No clearance is demanded of a pair that shares a joint.
+    row[quantities.RADII :] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
+    return row
 
 
 def poses_are_valid(
@@ -133,17 +145,49 @@ class Violation:
         return f"{self.limit} = {value} is {relation} {bound}"
 
 
+COLLISIONS = tuple(f"legs {pair_name(pair)}" for pair in PAIRS)
+"""Names of the limits that legs must not collide, such as "legs 2–3", in the order of `PAIRS`."""
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two legs that touch or overlap in a pose.
+
+    Attributes:
+        legs: Numbers of the two legs.
+        depth: Length by which they overlap, in design units; 0 if they only touch.
+    """
+
+    legs: tuple[int, int]
+    depth: float
+
+    @property
+    def limit(self) -> str:
+        """Name of the limit, as in `COLLISIONS`."""
+        return COLLISIONS[PAIRS.index(self.legs)]
+
+    def __str__(self) -> str:
+        return self.words()
+
+    def words(self, unit: Unit | None = None) -> str:
+        """Return the collision in words, in which the length has a unit if one is given."""
+        length = format_number(self.depth) if unit is None else unit.text(self.depth)
+        manner = f"overlap by {length}" if self.depth else "touch"
+        return f"legs {self.legs[0]} and {self.legs[1]} {manner}"
+
+
 def violations(
     configuration: Configuration,
     signs: tuple[int, int, int] | None = None,
     order: int | None = None,
-) -> list[tuple[Violation, ...]]:
-    """Return the limits that each pose of a batch violates, in the order of the design file.
+) -> list[tuple[Violation | Collision, ...]]:
+    """Return the limits that each pose of a batch violates, and the legs that collide in it.
 
-    For the signs and the order of the carriages see `demands_of`.
+    The limits are in the order of the design file. For the signs and the order of the carriages
+    see `demands_of`.
     """
     demands, values, beyond = sides_of_limits(configuration, signs, order)
-    return [
+    found = [
         tuple(
             Violation(demand, math.degrees(value) if demand.angle else value, above=side > 0)
             for demand, value, side in zip(demands, row, sides, strict=True)
@@ -151,6 +195,41 @@ def violations(
         )
         for row, sides in zip(values.tolist(), beyond.tolist(), strict=True)
     ]
+    colliding = colliding_pairs(configuration)
+    if not colliding.any():
+        return [*found]
+    depths = -leg_clearances(configuration).clearance.reshape(-1, len(PAIRS))
+    reach = configuration.design.reach
+    return [
+        (
+            *broken,
+            *(
+                Collision(pair, max(0.0, drop_rounding(depth, reach)))
+                for pair, collides, depth in zip(PAIRS, pairs, row, strict=True)
+                if collides
+            ),
+        )
+        for broken, pairs, row in zip(found, colliding.tolist(), depths.tolist(), strict=True)
+    ]
+
+
+def colliding_pairs(configuration: Configuration) -> BoolArray:
+    """Return which pairs of legs touch or overlap in n poses, as validity has it, shape (n, 6)."""
+    row = geometry_of(configuration.design)
+    poses = configuration.positions, configuration.rotations
+    colliding = np.zeros((len(poses[0]), len(PAIRS)), dtype=np.bool_)
+    is_clear = np.empty(len(colliding), dtype=np.bool_)
+    no_demands = np.empty((0, quantities.DEMAND_COLUMNS))
+    quantities.valid_rows(len(is_clear), row, no_demands, *poses, is_clear)
+    if is_clear.all():
+        return colliding
+    for pair in range(len(PAIRS)):
+        alone = row.copy()
+        alone[quantities.RADII :] = -1.0
+        alone[quantities.RADII + pair] = row[quantities.RADII + pair]
+        quantities.valid_rows(len(is_clear), alone, no_demands, *poses, is_clear)
+        colliding[:, pair] = ~is_clear
+    return colliding
 
 
 def sides_of_limits(

@@ -212,9 +212,9 @@ def orientations_within(
 ) -> BoolArray:
     """Return which rotations (n, 3, 3) a position can have within the limits, shape (n,).
 
-    The limits are those of `explorer.workspace.limits.valid_poses.violations`: lengths, guide, gap,
-    carriage order, box, margins with the home's sign triple, and swing demands. Position, tool and
-    errors are those of `orientation_capability`.
+    The limits are those of `explorer.workspace.limits.table`: lengths, guide, gap, carriage order,
+    box, margins with the home's sign triple, and swing demands, without the clearances of legs.
+    Position, tool and errors are those of `orientation_capability`.
     """
     p, r, t = one_position(position), rotation_array(rotations), one_tool(tool)
     if r.ndim != 3 or not len(r):

@@ -3,7 +3,7 @@
 The angles are those of `explorer.mechanism.tilt_torsion`. At a torsion the platform tilts from
 tilt zero in each azimuth, b4 or the tool held in its place, until it meets the first limit. That
 tilt is exact but for rounding (`explorer.workspace.orientations.turns`). The limits are those of
-`explorer.workspace.limits.valid_poses.violations`; collisions of legs are not among them.
+`explorer.workspace.limits.table`; collisions of legs are not among them.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_fitted
-from explorer.workspace.limits.valid_poses import Violation
+from explorer.workspace.limits.valid_poses import Collision, Violation
 
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
 """The modes by number and sign triple, as in lists and beside ghosts."""
@@ -110,7 +110,7 @@ def _row(frame: Frame, mode: int) -> str:
     )
 
 
-def _limits(broken: tuple[Violation, ...], look: str, unit: Unit) -> tuple[str, str]:
+def _limits(broken: tuple[Violation | Collision, ...], look: str, unit: Unit) -> tuple[str, str]:
     """Return the cell and the sentence on limits that are broken; `look` if none is."""
     if not broken:
         return f'<span class="{look}">within</span>', "It is within all limits."
