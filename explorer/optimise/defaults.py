@@ -16,6 +16,7 @@ from explorer.measures.measure import MARGIN_OF_CLEARANCE, longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.checks import MOST
+from explorer.numerics.number_text import format_apart
 from explorer.optimise import problem
 
 PAPER_VOLUME = 8000.0
@@ -63,9 +64,18 @@ def make_problem(
     a variable without bounds here has the default ones.
 
     Raises:
-        InputError: See `Problem`.
+        InputError: A variable that is bounded twice, or see `Problem`.
     """
-    given = {variable.name: variable for variable in bounds}
+    given: dict[str, problem.Variable] = {}
+    for variable in bounds:
+        first = given.setdefault(variable.name, variable)
+        if first is not variable:
+            ends = (first.low, first.high, variable.low, variable.high)
+            low, high, least, most = format_apart(ends)
+            raise InputError(
+                f"{variable.name} is bounded twice, from {low} to {high} and from {least} to "
+                f"{most}: give it one range"
+            )
     names = [*VARIABLES, *free, *(name for name in given if name not in VARIABLES)]
     variables = [given.get(name) or default_variable(start, name) for name in dict.fromkeys(names)]
     size = max(map(abs, start.variables))

@@ -93,6 +93,7 @@ optimise --target-volume 9 --bounds a3x=5:3 | bounds of a3x cross
 optimise --target-volume 9 --bounds a3x=5:nan | must be a finite number; got nan
 optimise --target-volume 9 --bounds a3x=20:30 | outside its bounds 20 to 30
 optimise --target-volume 9 --bounds a3x=19.1829001:30 | 19.1829, outside its bounds 19.1829001
+optimise --target-volume 9 --bounds yaw=-80:0 yaw=-90:0 | bounded twice, from -80 to 0 and from -90
 optimise --target-volume 9 --bounds a3x | NAME=LOW:HIGH
 optimise --target-volume 9 --bounds | needs at least one value
 optimise --target-volume 9 --free width | no variable 'width'
