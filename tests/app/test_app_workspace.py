@@ -255,6 +255,32 @@ def test_map_has_the_exact_outline_of_the_slice(axis: Axis) -> None:
         assert np.linalg.norm(places - point, axis=1).min() < 2e-3
 
 
+@pytest.mark.parametrize("region", ["limits", "held"])
+@pytest.mark.parametrize("colour", ["plain", "margin", "condition", "share", "force"])
+def test_legend_names_the_measure_of_the_map_and_the_levels_of_its_bands(
+    services: Services, region: str, colour: str
+) -> None:
+    state = load_state(region=region, colour=colour, cut="y")
+    follow(services, state)
+    text = panel_text(WorkspacePanel(services), state)
+    mapped = drawing_of(state).slice_map
+    assert mapped is not None
+    name, read, factor = {
+        "margin": ("Smallest |δ| (mm)", "min |δ|", LOADED.unit_mm),
+        "condition": ("1 / cond J", "1 / cond J", 1.0),
+        "share": ("Largest share of a limit (%)", "largest share of a limit", 100.0),
+        "force": ("Largest actuator force (N)", "largest actuator force", 1.0),
+    }[mapped.colouring.banded]
+    assert f'<span class="ex-dim">{name}</span>' in text
+    assert read in mapped.words_at((10.0, 5.0, 9.0), state.unit)
+    ticks = text[text.index('class="ex-ticks"') :].split("</div>")[0]
+    marked = re.findall(r">([\d.,]+)<", ticks)
+    levels = [level for level in mapped.colouring.bands.levels if math.isfinite(level)]
+    texts = {format_number(factor * level, digits) for level in levels for digits in (2, 3)}
+    assert len(marked) > 3
+    assert {*marked} <= {*texts, "0"}
+
+
 def test_b4_is_a_cross_where_it_is_and_faint_beside_the_slice() -> None:
     state = open_state(OPTIMAL)
     drawn = drawing_of(with_workspace(state, solid=True, cut="y")).slice_map

@@ -22,7 +22,13 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import Unit, format_number
 from explorer.singularity.colours import BAND_EDGES, band_colours, css
 from explorer.statics.reactions import has_limits
-from explorer.workspace.position_bands import MEASURE_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
+from explorer.workspace.position_bands import (
+    MEASURE_WORDS,
+    SHARE_COLOURS,
+    SHARES,
+    STEP_COLOURS,
+    PositionMeasure,
+)
 
 CLAIM = "claims.md#The designs of Table 1 have the printed extents and a volume of 7992."
 """The place in the manual that explains the paper's volume of its optimum."""
@@ -189,7 +195,7 @@ def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
 
 
 def legend(
-    measure: Measure, warn_below: float, drawing: work.WorkspaceDrawing | None, unit: Unit
+    measure: PositionMeasure, warn_below: float, drawing: work.WorkspaceDrawing | None, unit: Unit
 ) -> str:
     """Return the bands of colours with the values at their edges, and the colours of the map.
 

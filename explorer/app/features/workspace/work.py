@@ -30,6 +30,7 @@ from explorer.workspace.carried_region import carried_region
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.faces.faces import Faces, workspace_faces
 from explorer.workspace.limits.constraints import HalfSpace, constraints
+from explorer.workspace.position_bands import PositionMeasure
 from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
 from explorer.workspace.solids.solid import Solid, convex_hull, cut_solid
 from explorer.workspace.solids.solids import workspace_solid
@@ -334,12 +335,15 @@ def draw_radius_curve(request: Selection, channel: Channel | None = None) -> Rad
         return trouble_of(error)
 
 
-def map_measure(design: Design, colour: Measure, *, holds: bool) -> Measure:
-    """Return the measure of the map of a slice, "plain" for the margins.
+def map_measure(design: Design, colour: Measure, *, holds: bool) -> PositionMeasure:
+    """Return the measure of the map of a slice.
 
-    It is that which colours the surface, or the share of limits in what `holds` the load.
+    It is that which colours the surface; of a surface of one colour the smallest margin, or the
+    share of limits in what `holds` the load.
     """
-    return "share" if colour == "plain" and holds and has_limits(design) else colour
+    if colour != "plain":
+        return colour
+    return "share" if holds and has_limits(design) else "margin"
 
 
 def export_mesh(
