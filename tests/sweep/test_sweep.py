@@ -250,13 +250,9 @@ def test_node_measures_match_each_position(seed: int) -> None:
     design = design.with_limits(leg_radii=(0.3, 0.2, 0.1, 0.4))
     margin = 0.5
     found = node_measures(design, rotation, nodes=9, clearance_margin=margin)
-    kept = np.array(
-        [
-            p
-            for p in nodes_of(design, rotation, 9)
-            if not violations(Configuration(design, p, rotation))[0]
-        ]
-    )
+    nodes = nodes_of(design, rotation, 9)
+    broken = violations(Configuration(design.with_limits(leg_radii=(0.0,) * 4), nodes, rotation))
+    kept = nodes[[not each for each in broken]]
     assert len(kept)
     assert found.positions == pytest.approx(kept, rel=1e-12)
     distances = np.abs(margins(kept, rotation))
