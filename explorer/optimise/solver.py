@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 
 from explorer.errors import InputError
 from explorer.numerics.compiled import warm_in_background
@@ -51,14 +53,15 @@ def optimise_design(
     began = time.perf_counter()
     trail = Trail(problem, watch, stop)
     runs: list[Run] = []
-    for values in (problem.start_values, *more_starts(problem, starts - 1, seed)):
-        trail.run = len(runs)
-        best = runs[_best(runs, trail)] if runs else None
-        to_beat = best.best if best is not None and best.status == "converged" else None
-        runs.append(Search(problem, values, iterations, trail, to_beat).run())
-        done = problem.objective == "match-volume" and runs[-1].status == "converged"
-        if done or trail.is_cancelled:
-            break
+    with _one_thread():
+        for values in (problem.start_values, *more_starts(problem, starts - 1, seed)):
+            trail.run = len(runs)
+            best = runs[_best(runs, trail)] if runs else None
+            to_beat = best.best if best is not None and best.status == "converged" else None
+            runs.append(Search(problem, values, iterations, trail, to_beat).run())
+            done = problem.objective == "match-volume" and runs[-1].status == "converged"
+            if done or trail.is_cancelled:
+                break
 
     return Outcome(
         problem=problem,
@@ -67,6 +70,18 @@ def optimise_design(
         history=tuple(trail.history),
         seconds=time.perf_counter() - began,
     )
+
+
+def _one_thread() -> AbstractContextManager[object]:
+    """Keep linear algebra to one thread in a `with` block.
+
+    SLSQP calls LAPACK, whose last digits depend on the number of threads, and so on the machine.
+    """
+    from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
+
+    # A library that is loaded within the block would not be limited.
+    importlib.import_module("scipy.linalg")
+    return threadpool_limits(1, "blas")
 
 
 def _best(runs: Sequence[Run], trail: Trail) -> int:

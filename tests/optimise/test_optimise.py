@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -14,6 +14,10 @@ from limited_designs import limited
 from long_cases import long_after
 from machines import same_for_all
 from refusals import refusal
+from threadpoolctl import (  # pyright: ignore[reportMissingTypeStubs]
+    threadpool_info,
+    threadpool_limits,
+)
 
 from explorer import (
     PRESETS,
@@ -391,6 +395,17 @@ def test_record_read_back_repeats_the_search() -> None:
     assert again.history == outcome.history
     assert again.runs == outcome.runs
     assert {"python", "numpy", "scipy", "numba", "flagged-explorer"} == set(record.versions)
+
+
+def test_search_has_the_same_last_digits_with_any_number_of_threads() -> None:
+    histories: list[tuple[Iterate, ...]] = []
+    for count in (1, 2, 3):
+        with threadpool_limits(count, "blas"):
+            histories.append(optimise_design(paper_problem(0.2)).history)
+            # The caller's threads are as they were.
+            libraries = cast("list[dict[str, Any]]", threadpool_info())
+            assert {library["num_threads"] for library in libraries} == {count}
+    assert histories[0] == histories[1] == histories[2]
 
 
 # Bad input
