@@ -1,4 +1,4 @@
-"""Notices, files, the tour, and the theme."""
+"""Notices, files, and the theme."""
 
 from __future__ import annotations
 
@@ -10,25 +10,18 @@ from types import SimpleNamespace
 from typing import Any
 from unittest.mock import Mock
 
-import numpy as np
 import pytest
 from client import Client, client_of, press_update, presses_in, wait_for
 from services import StubWorker
 
 from explorer.app.browser.downloads import Downloads
 from explorer.app.features.designs.feature import UNSAVED
-from explorer.app.features.help.tour import STEPS, EndTour, Tour
-from explorer.app.features.optimise.actions import EndRun
-from explorer.app.features.optimise.state import SearchResult
 from explorer.app.server import Running, start
 from explorer.app.session.session import move_to
 from explorer.app.state.actions import SetPosition
-from explorer.app.state.frame import Frame
-from explorer.app.state.state import open_state
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
-from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
 
@@ -146,36 +139,6 @@ def test_file_of_any_design_has_a_name_that_shows(design: str, file: str) -> Non
     server: Any = SimpleNamespace(get_clients=lambda: {1: client})
     Downloads(server, StubWorker(), Mock()).send(1, f"{design}.json", b"")
     assert client.send_file_download.call_args.args[0] == file
-
-
-@pytest.mark.parametrize("design", PRESETS.values(), ids=str)
-def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design) -> None:
-    state = start = open_state(design)
-    tour = Tour(0, Frame(state))
-    assert tour.step_by(-1, Frame(state)).at == 0
-    for index, step in enumerate(STEPS):
-        assert tour.at == index
-        if step.before is not None:
-            state = step.before.apply(state)
-        assert not tour.after_frame(Frame(state)).is_done
-        state = tour.step.show(Frame(state)).apply(state)
-        if state.optimisation.is_on:
-            assert not tour.after_frame(Frame(state)).is_done
-            state = EndRun(1, SearchResult("failed", "no answer")).apply(state)
-        tour = tour.after_frame(Frame(state))
-        assert tour.is_done
-        # Wherever the tour ends, all is as it was before.
-        end = EndTour(start).apply(state)
-        assert (end.design, end.pose, end.view) == (start.design, start.pose, start.view)
-        # It comes close to a singularity without reaching it.
-        assert np.abs(Frame(state).snapshot.margins).min() > 0.0
-        # Once done it stays so, whatever is done next.
-        assert tour.after_frame(Frame(start)).is_done
-        if step.after is not None:
-            state = step.after.apply(state)
-        assert tour.is_last == (index == len(STEPS) - 1)
-        tour = tour.step_by(1, Frame(state))
-    assert tour.at == len(STEPS) - 1
 
 
 def test_theme_is_that_of_each_browser_and_no_step_of_the_history(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ opened.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import Field, fields, replace
+from dataclasses import Field, fields, is_dataclass, replace
 from typing import Any, Self, TypeVar, cast
 
 import msgspec
@@ -102,3 +102,32 @@ def with_value(whole: Whole, path: str, value: object) -> Whole:
     if isinstance(part, msgspec.Struct):
         return cast("Whole", msgspec.structs.replace(part, **{name: new}))
     return replace(part, **{name: new})
+
+
+def take_back(before: Whole, after: Whole, now: Whole) -> Whole:
+    """Return a frozen value without a change that led from one value to another.
+
+    Each part that has the value which the change gave it has the one before the change again; what
+    was changed since stays.
+
+    Raises:
+        InputError: A part refuses the value.
+    """
+    if now == after:
+        return before
+    if not _names_of(before) == _names_of(after) == _names_of(now):
+        return now
+    for name in _names_of(now):
+        old, new = value_at(before, name), value_at(after, name)
+        if old != new:
+            now = with_value(now, name, take_back(old, new, value_at(now, name)))
+    return now
+
+
+def _names_of(value: Any) -> tuple[str, ...]:
+    """Return the names of the parts of a value in a path; none of a plain one."""
+    if isinstance(value, tuple):
+        return tuple(map(str, range(len(cast("tuple[object, ...]", value)))))
+    if isinstance(value, msgspec.Struct):
+        return value.__struct_fields__
+    return tuple(field.name for field in fields(value)) if is_dataclass(value) else ()

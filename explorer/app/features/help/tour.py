@@ -1,15 +1,17 @@
 """The tour for first-time users: five steps, each done by the user, shown or skipped.
 
-A step turns to its tab and rings its control. In the end, and wherever the tour is skipped, the
-state is again what it was before, in one step of the history, so that nothing is lost.
+A step turns to its tab and rings its control. In the end, and wherever the tour is skipped, what
+the tour has changed is taken back, in one step of the history, so that nothing is lost. What people
+have changed meanwhile, in this browser or another, stays.
 """
 
 from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from html import escape
 from typing import ClassVar
 
@@ -17,14 +19,16 @@ import viser
 
 from explorer.app.browser.viser_gaps import run_script_in
 from explorer.app.features.feature import Runner, Services
-from explorer.app.features.optimise.actions import CancelRun, StartRun, TakePaperProblem
-from explorer.app.features.optimise.state import Optimisation
+from explorer.app.features.optimise.actions import CancelRun, Revert, StartRun, TakePaperProblem
+from explorer.app.features.optimise.state import Optimisation, SearchRun
 from explorer.app.look import read_script
 from explorer.app.session.history import restore, start_history
-from explorer.app.state.actions import Action, GoHome, Set, SetPosition, SetVariable
+from explorer.app.state.actions import Action, GoHome, Set, SetPosition, SetVariable, move_to
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import take_back, with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
+from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import PAPER_VOLUME
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
@@ -32,9 +36,10 @@ from explorer.optimise.defaults import PAPER_VOLUME
 STRIDE, NEAR, GROWTH = 0.1, 0.5, 1.1
 PRESS, OFFER = "tour", "offer"
 BUSY = "the tour changes the design: let the search end first, or cancel it"
-OVER = "Design, pose and view are as before the tour. Undo brings back what you did in it."
+OVER = "What the tour changed is taken back, and what you changed stays. Undo shows it again."
+STAYS = "The design that the tour opened stays, since it was changed. Undo and History have yours."
 BUTTONS = {
-    "Skip": "End the tour, and put everything back; the command Tour begins it again.",
+    "Skip": "End the tour, and take back what it has changed; the command Tour begins it again.",
     "Back": "Go back to the step before.",
     "Show me": "Let the explorer do what this step asks for.",
     "Next": "Go on to the next step, or end the tour.",
@@ -63,19 +68,53 @@ class Step:
     after: Action | None = None
 
 
+Change = tuple[State, State]
+"""The states before and after an action of the tour."""
+
+
 @dataclass(frozen=True)
 class EndTour(Action):
-    """Return to the state before the tour; designs to compare and studies stay as they are."""
+    """Take back what the tour has changed, with the search from a design that it opened."""
 
     template: ClassVar[str] = "End the tour"
 
-    before: State
+    changes: tuple[Change, ...]
 
     def apply(self, state: State) -> State:
         """Return the next state; refuse while a design is being optimised."""
-        after, _ = restore(start_history(self.before), state)
-        view, compared, studies = self.before.view, state.compared, state.studies
-        return replace(after, view=view, compared=compared, studies=studies)
+        after, run = state, own_search(state, self.changes)
+        if run is not None and not run.accepted:
+            after = with_value(Revert().apply(state), "optimisation.run", None)
+        for change in reversed(self.changes):
+            after = _take_back(change, after)
+        restored, _ = restore(start_history(after), state)
+        return replace(restored, view=after.view)
+
+
+def own_search(state: State, changes: Sequence[Change]) -> SearchRun | None:
+    """Return the last search if it began at a design that the tour has opened; else None."""
+    run = Optimisation.of(state).run
+    is_own = run is not None and any(
+        before.base != after.base
+        and run.own.design == after.design
+        and run.number > Optimisation.of(after).count
+        for before, after in changes
+    )
+    return run if is_own else None
+
+
+def _take_back(change: Change, state: State) -> State:
+    """Return a state without one change; a design that it opened stays once it was changed."""
+    before, after = change
+    if before.base != after.base and state.design != after.design:
+        return state
+    whole = take_back(before, after, state)
+    if (state.design, state.pose, state.joints) == (after.design, after.pose, after.joints):
+        return whole
+    # Angles belong to the quaternion, and joints to the pose and the design.
+    turned = before if state.pose.quaternion == after.pose.quaternion else state
+    pose = Pose(whole.pose.position, turned.pose.quaternion)
+    return move_to(replace(whole, pose=pose), pose, turned.yaw_pitch_roll)
 
 
 def _approach(frame: Frame) -> Action:
@@ -186,11 +225,11 @@ def _result(frame: Frame) -> str:
 
 @dataclass
 class _Card:
-    """The tour of one browser, and the state before it."""
+    """The tour of one browser, and what it has changed so far."""
 
     client: viser.ClientHandle
-    before: State
     tour: Tour
+    changes: list[Change] = field(default_factory=list[Change])
 
     def show(self, tour: Tour) -> None:
         """Show the card of the tour at another step or with another result."""
@@ -217,8 +256,8 @@ class TourGuide(Runner):
         # Presses, frames and browsers come on threads of their own.
         self._lock = threading.RLock()
         self._cards: dict[int, _Card] = {}
-        # Tours that have ended, with the client, until the state before them is back.
-        self._ended: list[tuple[int, State]] = []
+        # Tours that have ended, until what they have changed is taken back.
+        self._ended: list[_Card] = []
         services.buttons.on(PRESS, self._press, values=(OFFER, *BUTTONS))
         if services.offers_tour:
             offer = f"{read_script('tour')}window.explorer.tour.offer();"
@@ -234,30 +273,54 @@ class TourGuide(Runner):
             self._services.complain(BUSY, client.client_id)
             return
         with self._lock:
-            card = _Card(client, state, Tour(0, Frame(state)))
+            card = _Card(client, Tour(0, Frame(state)))
             self._cards[client.client_id] = card
             card.draw()
 
     def follow(self, frame: Frame) -> None:
-        """Mark the steps that a frame shows as done, and put back what tours have changed."""
+        """Mark the steps that a frame shows as done, and end the tours that are over."""
         with self._lock:
             for card in tuple(self._cards.values()):
                 card.show(card.tour.after_frame(frame))
             if not frame.state.optimisation.is_on:
                 ended, self._ended = self._ended, []
-                for who, before in ended:
-                    self._session.do(EndTour(before), who=who)
-                    if (before.design, before.pose) != (frame.state.design, frame.state.pose):
-                        self._services.tell(OVER, who)
+                for card in ended:
+                    self._session.do(partial(self._take_back, card), who=card.client.client_id)
+
+    def _take_back(self, card: _Card, state: State) -> EndTour | None:
+        """Return the action that takes back what a tour has changed; None if nothing is left."""
+        if not card.changes:
+            return None
+        end = EndTour(tuple(card.changes))
+        after = end.apply(state)
+        opened = [before.base for before, shown in card.changes if before.base != shown.base]
+        if opened and after.base != opened[0]:
+            self._services.tell(STAYS, card.client.client_id)
+        elif (after.design, after.pose) != (state.design, state.pose):
+            self._services.tell(OVER, card.client.client_id)
+        return end
 
     def _end(self, who: int) -> None:
-        """End the tour of a browser; a search that it began is cancelled first."""
+        """End the tour of a browser; a search from a design that it opened is cancelled first."""
         with self._lock:
             card = self._cards.pop(who, None)
             if card is not None:
                 card.close()
-                self._ended.append((who, card.before))
-                self._session.do(CancelRun(), who=who)
+                self._ended.append(card)
+                self._session.do(
+                    lambda state: CancelRun() if own_search(state, card.changes) else None, who=who
+                )
+
+    def _do(self, card: _Card, make: Callable[[State], Action | None]) -> None:
+        """Do an action of the tour, and note what it changes."""
+
+        def change(state: State) -> Action | None:
+            action = make(state)
+            if action is not None:
+                card.changes.append((state, action.apply(state)))
+            return action
+
+        self._session.do(change, who=card.client.client_id)
 
     def _press(self, name: str, client: viser.ClientHandle) -> None:
         card = self._cards.get(client.client_id)
@@ -267,17 +330,15 @@ class TourGuide(Runner):
             return
         step = card.tour.step
         if name == "Show me":
-            self._session.do(lambda state: step.show(Frame(state)), who=client.client_id)
+            self._do(card, lambda state: step.show(Frame(state)))
         elif name == "Skip" or (name == "Next" and card.tour.is_last):
             self._end(client.client_id)
         else:
-            if name == "Next" and step.after is not None:
-                self._session.do(step.after, who=client.client_id)
+            if name == "Next":
+                self._do(card, lambda _: step.after)
             tour = card.tour.step_by(1 if name == "Next" else -1, Frame(self._session.state))
             first = tour.step.before
-            self._session.do(
-                lambda state: None if state.optimisation.is_on else first, who=client.client_id
-            )
+            self._do(card, lambda state: None if state.optimisation.is_on else first)
             with self._lock:
                 card.show(tour)
 
