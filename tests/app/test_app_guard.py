@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import logging
 import math
+import re
 import socket
 import threading
 from collections.abc import Generator
@@ -20,7 +21,7 @@ import numpy as np
 import pytest
 import viser
 import websockets.asyncio.server
-from client import client_of, opened, press_update, wait_for
+from client import client_of, opened, press_update, wait_for, wait_until_heard
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import CloseCode
 from websockets.sync.client import ClientConnection
@@ -29,6 +30,7 @@ from explorer.app.browser.viser_server import LARGEST_UPLOAD, start_viser, stop_
 from explorer.app.features.optimise import buttons
 from explorer.app.security import LARGEST_MESSAGE, Access, Guard
 from explorer.app.server import Running, start
+from explorer.app.storage.session_file import encode_session
 from explorer.errors import ServerError
 from explorer.mechanism.design_file import PRESETS
 
@@ -157,7 +159,7 @@ def test_guard_orders_of_a_client_reach_no_other_client(running: Running) -> Non
         watching.read_all_sent(running)
         for order in ORDERS:
             client.send(order)
-        client.flush()
+        wait_until_heard(running, client)
         messages = watching.read_all_sent(running)
     assert not any(each.get("source") == "alert(1)" for each in messages)
     kinds = {message["type"] for message in messages}
@@ -228,12 +230,40 @@ def test_guard_state_stays_sound_whatever_its_controls_are_given(
                 for turn in range(TURNS):
                     for count, uuid in enumerate(inputs):
                         client.update(uuid, ANYTHING[(7 * turn + count) % len(ANYTHING)])
-                    client.flush()
+                    wait_until_heard(running, client)
                     assert session.wait_until_idle(PATIENCE_SECONDS)
         assert session.wait_until_idle(PATIENCE_SECONDS)
         state = session.state
         assert np.isfinite([*state.joints, *state.pose.position, *state.pose.quaternion]).all()
         assert np.isfinite(state.design.variables).all()
+    finally:
+        running.stop()
+
+
+def test_guard_number_that_is_not_finite_is_refused_by_every_control(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.CRITICAL)
+    running = start(DESIGN, port=0)
+    session = running.page.session
+    try:
+        with client_of(running) as client:
+            client.read_all_sent(running)
+            numbers: dict[str, Any] = {
+                uuid: props["value"]
+                for uuid, props in client.controls.items()
+                if re.search("Slider|Number|Vector", props["type"])
+            }
+            assert len(numbers) > 50
+            before = encode_session(session.history)
+            with drained(client.connection):
+                for wrong in (math.nan, math.inf, -math.inf):
+                    for uuid, value in numbers.items():
+                        is_row = hasattr(value, "__len__")
+                        client.update(uuid, [wrong] * len(value) if is_row else wrong)
+                    wait_until_heard(running, client)
+                    assert session.wait_until_idle(PATIENCE_SECONDS)
+        assert encode_session(session.history) == before
     finally:
         running.stop()
 
@@ -268,7 +298,6 @@ def test_guard_upload_is_taken_whole_and_acknowledged_to_nobody(running: Running
 
             begin["source_component_uuid"] = source
             client.send({**begin, "transfer_uuid": "empty", "part_count": 0, "size_bytes": 0})
-            client.flush()
             # The button has one value, so the next upload would replace it before it is read.
             wait_for(lambda: taken == [b""])
             client.send({**begin, "transfer_uuid": "two", "part_count": 2, "size_bytes": 6})

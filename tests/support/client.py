@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 import re
 import socket
+import threading
 import time
 from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 from html import unescape
-from typing import Any
+from typing import Any, Protocol
 
 import msgspec
 import viser
@@ -94,6 +95,23 @@ def press_update(running: Running, name: str, value: str = "") -> tuple[str, str
     return element_id(running.page.buttons.inbox), msgspec.json.encode(press).decode()
 
 
+class Sender(Protocol):
+    """A connection that gives controls their values."""
+
+    def update(self, uuid: str, value: object) -> None:
+        """Give a control a value."""
+        ...
+
+
+def wait_until_heard(running: Running, *senders: Sender) -> None:
+    """Wait until the server has taken all that connections have sent so far, in their order."""
+    for sender in senders:
+        heard, name = threading.Event(), f"heard.{next(_COUNT)}"
+        running.page.buttons.on(name, lambda _, __, heard=heard: heard.set())
+        sender.update(*press_update(running, name))
+        assert heard.wait(PATIENCE_SECONDS), "the server does not listen"
+
+
 class Client:
     """A client of an explorer that counts as a tab.
 
@@ -161,7 +179,7 @@ class Client:
         return messages
 
     def flush(self) -> None:
-        """Return once the server has read all that was sent."""
+        """Return once all that was sent has arrived; see `wait_until_heard` for more."""
         assert self.connection.ping().wait(PATIENCE_SECONDS)
 
 

@@ -60,12 +60,6 @@ class SocketTab:
             }
         )
 
-    def flush(self) -> None:
-        """Return once the server has read all that was sent."""
-        # It answers in the order in which it reads.
-        with suppress(ConnectionClosed):
-            self._connection.ping().wait(30.0)
-
     def close(self) -> None:
         """Close as a browser does."""
         self._connection.close()

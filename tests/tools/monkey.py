@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 import psutil
 import server_clock
 import viser
-from client import press_update, presses_in, wait_for
+from client import press_update, presses_in, wait_for, wait_until_heard
 from page_props import differences, shown_by
 from server_clock import wait_until_drawn
 from socket_tab import SocketTab
@@ -54,8 +54,6 @@ KILL_SECONDS = 5.0
 EXPECTED = re.compile(
     "|".join((re.escape(RESTARTED), ".*".join(map(re.escape, UNDONE.split("{}")))))
 )
-# The button by whose press a tab tells that all it has sent before has been handled.
-HEARD = "monkey.heard"
 # Seconds that pass in a second of the machine's while a slider is dragged, lest a drag on a busy
 # machine becomes two, and those after which the next gesture is another one.
 SLOW_PACE, REST_SECONDS = 0.001, 2.0
@@ -131,11 +129,8 @@ class Monkey:
         page.session._report = self._keep_fault
         self._in_turn = in_turn
         self._calls: list[Future[Any]] = []
-        self._heard: set[str] = set()
-        if in_turn:
-            pool = self._gui._thread_executor
-            pool.submit = self._keep_call(pool.submit)
-            running.page.buttons.on(HEARD, lambda value, _: self._heard.add(value))
+        pool = gui._thread_executor
+        pool.submit = self._keep_call(pool.submit)
 
     def run(self, actions: int) -> Report:
         """Do so many things, look now and then, and say what came of it."""
@@ -187,18 +182,14 @@ class Monkey:
 
     def _hear(self) -> None:
         """Wait until all that the tabs have sent is handled."""
-        self._heard.clear()
-        for number, tab in enumerate(self._tabs):
-            tab.update(*press_update(self.running, HEARD, str(number)))
-            wait_for(lambda number=number: str(number) in self._heard)
-        wait(self._calls, PATIENCE_SECONDS)
-        self._calls.clear()
+        wait_until_heard(self.running, *self._tabs)
+        calls, self._calls = self._calls, []
+        assert not wait(calls, PATIENCE_SECONDS).not_done
         assert self.running.page.session.wait_until_idle(PATIENCE_SECONDS)
 
     def look(self) -> None:
         """Wait for quiet, and compare the page with a new one of the same state."""
-        for tab in self._tabs:
-            tab.flush()
+        self._hear()
         self._settle()
         self.report.threads.append(threading.active_count())
         self.report.processes.append(len(psutil.Process().children(recursive=True)))

@@ -8,6 +8,7 @@ pointer.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, Literal, TypeAlias, TypedDict, TypeVar, Unpack, cast
@@ -31,6 +32,7 @@ from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.markup import colour_strip
+from explorer.errors import InputError
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import snap_to_decimals
@@ -187,6 +189,10 @@ class Control(Generic[Value]):
     def _change(self, state: State) -> Action:
         self._last_value = self.handle.value
         self._is_set_here = True
+        for number in _parts(self._last_value):
+            # No session file could hold it.
+            if isinstance(number, float) and not math.isfinite(number):
+                raise InputError(f"a value must be a finite number; got {number}")
         return self.bound.write(state, self._last_value)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
