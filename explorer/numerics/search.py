@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import importlib
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -32,6 +35,24 @@ class Stages:
         self._started += 1
 
 
+def one_thread() -> AbstractContextManager[object]:
+    """Keep linear algebra to one thread within a `with` block.
+
+    SLSQP calls LAPACK, whose last digits depend on the number of threads, and so on the machine.
+    """
+    return _libraries().limit(limits=1, user_api="blas")
+
+
+@functools.cache
+def _libraries() -> Any:
+    """Return the controller of the threads of the libraries of linear algebra."""
+    from threadpoolctl import ThreadpoolController  # pyright: ignore[reportMissingTypeStubs]
+
+    # It controls only libraries that are loaded.
+    importlib.import_module("scipy.linalg")
+    return ThreadpoolController()
+
+
 def descend(
     objective: Callable[[FloatArray], tuple[float, FloatArray]],
     constraints: Callable[[FloatArray], FloatArray],
@@ -46,13 +67,14 @@ def descend(
     from scipy import optimize
 
     untyped: Any = optimize
-    result = untyped.minimize(
-        objective,
-        start,
-        jac=True,
-        method="SLSQP",
-        constraints={"type": "ineq", "fun": constraints},
-        options={"maxiter": 60, "ftol": 1e-14},
-    )
+    with one_thread():
+        result = untyped.minimize(
+            objective,
+            start,
+            jac=True,
+            method="SLSQP",
+            constraints={"type": "ineq", "fun": constraints},
+            options={"maxiter": 60, "ftol": 1e-14},
+        )
     variables = np.asarray(result.x, dtype=np.float64)
     return variables if np.isfinite(variables).all() else None

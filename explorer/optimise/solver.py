@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 
 from explorer.errors import InputError
 from explorer.numerics.compiled import warm_in_background
+from explorer.numerics.search import one_thread
 from explorer.optimise.outcome import Iterate, Outcome, Run
 from explorer.optimise.problem import Problem
 from explorer.optimise.search.search import Search
@@ -53,7 +52,7 @@ def optimise_design(
     began = time.perf_counter()
     trail = Trail(problem, watch, stop)
     runs: list[Run] = []
-    with _one_thread():
+    with one_thread():
         for values in (problem.start_values, *more_starts(problem, starts - 1, seed)):
             trail.run = len(runs)
             best = runs[_best(runs, trail)] if runs else None
@@ -70,18 +69,6 @@ def optimise_design(
         history=tuple(trail.history),
         seconds=time.perf_counter() - began,
     )
-
-
-def _one_thread() -> AbstractContextManager[object]:
-    """Keep linear algebra to one thread in a `with` block.
-
-    SLSQP calls LAPACK, whose last digits depend on the number of threads, and so on the machine.
-    """
-    from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
-
-    # A library that is loaded within the block would not be limited.
-    importlib.import_module("scipy.linalg")
-    return threadpool_limits(1, "blas")
 
 
 def _best(runs: Sequence[Run], trail: Trail) -> int:

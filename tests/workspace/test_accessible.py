@@ -13,6 +13,7 @@ from limited_designs import limited, ordinary_case
 from long_cases import long_after
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order
+from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
 
 from explorer import (
     PRESETS,
@@ -249,6 +250,19 @@ def test_least_clearances_at_random_positions_hold(design: Design, margin: float
     assert len(points) > 300
     sampled = leg_clearances(Configuration(design, points, r)).clearance.min(axis=0)
     assert (found.clearance <= sampled + 1e-12).all()
+
+
+def test_least_clearances_have_the_same_last_digits_with_any_number_of_threads() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        factors = 1.0 + 0.1 * rng.normal(size=6)
+        design = OPTIMAL.with_variables((OPTIMAL.variables * factors).tolist())
+        found: list[list[float]] = []
+        for count in (1, 2, 4):
+            with threadpool_limits(count, "blas"):
+                least = least_clearances(design, margin=0.5)
+            found.append([*least.clearance.tolist(), *least.position.ravel().tolist()])
+        assert found[0] == found[1] == found[2]
 
 
 def test_distance_gradients_agree_with_finite_differences() -> None:
