@@ -20,6 +20,7 @@ from viser._messages import (
 )
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
+from explorer.app.browser.client_page import ClientPage
 from explorer.app.security import Serve
 from explorer.errors import ServerError
 
@@ -46,7 +47,8 @@ def start_viser(
     # Gap: viser wakes tabs that wait for messages from threads outside of their loop.
     internals: Any = viser.infra
     internals._infra.AsyncMessageBuffer = _Buffer
-    with contextlib.redirect_stdout(io.StringIO()), _serve_through(guarded) as is_guarded:
+    page = ClientPage()
+    with contextlib.redirect_stdout(io.StringIO()), _serve_through(guarded, page) as is_guarded:
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if not is_guarded():
         stop_viser(server)
@@ -54,6 +56,9 @@ def start_viser(
             f"viser {viser.__version__} serves in a way that the explorer does not guard; "
             "install the version that it asks for: pip install --force-reinstall flagged-explorer"
         )
+    server_internals: Any = server
+    messages = server_internals._websock_server.get_message_buffer().message_from_id
+    page.count_messages = lambda: len(messages)
     return server
 
 
@@ -77,8 +82,10 @@ class _Buffer(AsyncMessageBuffer):
 
 
 @contextlib.contextmanager
-def _serve_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Callable[[], bool]]:
-    """Let viser serve through `guarded`; yield a function that returns whether it did."""
+def _serve_through(
+    guarded: Callable[[Serve], Serve] | None, page: ClientPage
+) -> Generator[Callable[[], bool]]:
+    """Let viser serve our page, through `guarded`; yield a function that says whether it did."""
     websockets_server: Any = websockets.asyncio.server
     plain = websockets_server.serve
     chosen = plain if guarded is None else guarded(plain)
@@ -86,6 +93,7 @@ def _serve_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Callab
 
     def serve(*args: Any, **options: Any) -> Any:
         used.append(True)
+        options["process_request"] = page.answering(options["process_request"])
         return chosen(*args, **options)
 
     websockets_server.serve = serve
