@@ -183,8 +183,6 @@ class Page:
         self._panels = deque(self._add_panels() if panels else ())
         shown = self.panels if panels else None
         layout = Layout(server, self.buttons, self.services.cameras, shown)
-        if panels:
-            run_script(server, read_script("connection", user_data is not None))
         theme.begin(server)
         self.palette = self._add_palette(layout)
         for message in () if user_data is None else user_data.messages:
@@ -192,7 +190,10 @@ class Page:
         server.on_client_connect(self._show_pending)
         server.on_client_connect(self.services.cameras.connected)
         server.on_client_disconnect(self.services.cameras.disconnected)
-        server.on_client_connect(lambda client: listen(client, presses, self._follow_after_release))
+        is_saved = user_data is not None
+        server.on_client_connect(
+            lambda client: listen(client, presses, self._follow_after_release, is_saved=is_saved)
+        )
         server.on_client_disconnect(lambda client: self._forget(client.client_id))
         self._is_complete = True
         self.session.redraw()

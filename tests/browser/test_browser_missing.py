@@ -1,14 +1,24 @@
-"""The page where something is missing: a fast network."""
+"""The page where something is missing: the explorer's answers, or a fast network."""
 
 from __future__ import annotations
 
 import re
-from contextlib import closing
+import threading
+from collections.abc import Generator
+from contextlib import closing, contextmanager
+from typing import Any
 
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Locator, expect
+from tab import Tab
 
 from explorer.app.server import Running
 
+ADVANCE = "milliseconds => window.explorer.clock.advance(milliseconds)"
+# Lets time pass, and waits for what comes from the explorer after that.
+ANSWER = """milliseconds => new Promise((resolve) => {
+    window.explorer.clock.advance(milliseconds);
+    window.explorer.socket.listen(({ type }) => resolve(type));
+})"""
 # Notes at each frame whether the start screen and the bar are there, and how much has come.
 WATCH = """(() => {
     window.noted = [];
@@ -25,6 +35,56 @@ WATCH = """(() => {
 # Bytes of viser's page that came over the network.
 TRANSFERRED = """performance.getEntriesByType("resource")
     .find(({ name }) => name.includes("viser.html")).transferSize"""
+
+
+@contextmanager
+def suspended(running: Running) -> Generator[None]:
+    """Have an explorer read and send nothing meanwhile, as one whose process is stopped."""
+    goes_on = threading.Event()
+    server: Any = running.viser
+    server._websock_server._background_event_loop.call_soon_threadsafe(goes_on.wait)
+    yield
+    goes_on.set()
+
+
+def lost(tab: Tab) -> Locator:
+    """Return the message that the explorer does not answer."""
+    words = re.compile(r"The explorer has not answered since \d\d:\d\d:\d\d")
+    return tab.page.get_by_role("alert").filter(has_text=words)
+
+
+def test_silent_explorer_is_told_and_its_numbers_are_marked_until_it_answers(tab: Tab) -> None:
+    numbers = tab.page.locator("div[style*=opacity]:has(> * .ex-bar, > .ex-bar)").last
+    tab.settle()
+    with suspended(tab.running):
+        tab.page.evaluate(ADVANCE, 9_900)
+        expect(lost(tab)).to_have_count(0)
+        tab.page.evaluate(ADVANCE, 2_600)
+        expect(lost(tab)).to_be_visible()
+        expect(numbers).to_have_css("opacity", "0.5")
+    expect(lost(tab)).to_have_count(0)
+    expect(numbers).to_have_css("opacity", "1")
+    # What the page asked meanwhile ends no step.
+    assert len(tab.running.page.session.history.steps) == 1
+
+
+def test_page_asks_an_explorer_that_has_nothing_to_say(tab: Tab) -> None:
+    tab.settle()
+    assert tab.page.evaluate(ANSWER, 5_000) == "message_batch"
+    expect(lost(tab)).to_have_count(0)
+
+
+def test_page_connects_anew_to_an_explorer_that_stays_silent(
+    browser: Browser, running: Running
+) -> None:
+    with closing(Tab(browser, running)) as tab:
+        tab.settle()
+        before = set(running.viser.get_clients())
+        with suspended(running):
+            tab.page.evaluate(ADVANCE, 30_000)
+        tab.wait_for(lambda: bool(set(running.viser.get_clients()) - before), "a connection")
+        expect(lost(tab)).to_have_count(0)
+        expect(tab.label("y")).to_be_visible()
 
 
 def test_start_screen_says_how_much_has_come_and_covers_the_page_until_all_is_there(

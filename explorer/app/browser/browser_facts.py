@@ -1,4 +1,4 @@
-"""What only a browser knows: when its user presses and releases.
+"""What only a browser knows: when its user presses and releases, and whether it is answered.
 
 viser reports values alone. So scripts of the page write the rest to hidden fields, by the same way
 and in the same order as the values of other controls: a value is known to come from the press
@@ -29,9 +29,20 @@ def decode_text(text: str, decoder: msgspec.json.Decoder[Described]) -> Describe
         return None
 
 
-def listen(client: viser.ClientHandle, presses: Presses, at_release: Callable[[], None]) -> None:
-    """Record the presses of a browser that has connected; call `at_release` after each release."""
-    field = client.gui.add_number("Press", 0, visible=False)
+def listen(
+    client: viser.ClientHandle, presses: Presses, at_release: Callable[[], None], *, is_saved: bool
+) -> None:
+    """Listen to a browser that has connected: record its presses, and answer what it asks.
+
+    Args:
+        client: The browser.
+        presses: Where its presses are recorded.
+        at_release: Called after each release.
+        is_saved: Whether the session is saved, of which the page tells while nobody answers it.
+    """
+    field, questions = (
+        client.gui.add_number(name, 0, visible=False) for name in ("Press", "Question")
+    )
 
     # On the thread that reads the browser's messages, one after the other.
     @field.on_update
@@ -41,4 +52,10 @@ def listen(client: viser.ClientHandle, presses: Presses, at_release: Callable[[]
         if number <= 0:
             at_release()
 
+    # Whether there is anybody: whatever arrives there is an answer.
+    @questions.on_update
+    async def _(_: viser.GuiEvent[viser.GuiNumberHandle[int]]) -> None:
+        run_script_in(client, "")
+
     run_script_in(client, read_script("holds", element_id(field)))
+    run_script_in(client, read_script("connection", element_id(questions), is_saved))

@@ -3,8 +3,9 @@
 window.explorer.clock ??= (() => {
   const startTimer = window.setTimeout.bind(window),
     stopTimer = window.clearTimeout.bind(window);
-  // What waits, by its number: when it is due, what it does, and the browser's timer for it. The
-  // numbers are negative, so that none of them is that of a timer of the browser.
+  // What waits, by its number: when it is due, what it does, whether it returns for ever, so that the
+  // page is at rest all the same, and the browser's timer for it. The numbers are negative, so that
+  // none of them is that of a timer of the browser.
   const pending = new Map();
   let count = 0,
     frames = 0;
@@ -26,9 +27,9 @@ window.explorer.clock ??= (() => {
     each.timer = startTimer(end, Math.max(0, each.due - now()) / pace, number);
   };
   // Calls a function after a pause in milliseconds; returns the number to cancel it by.
-  const after = (pause, run) => {
+  const after = (pause, run, returns = false) => {
     count -= 1;
-    pending.set(count, { due: now() + pause, run, timer: null });
+    pending.set(count, { due: now() + pause, run, returns, timer: null });
     wait(count);
     return count;
   };
@@ -58,16 +59,17 @@ window.explorer.clock ??= (() => {
     ahead += Math.max(0, until - now());
     for (const number of pending.keys()) wait(number);
   };
+  const unreturning = () => [...pending.values()].filter(({ returns }) => !returns);
   // Ends the pause that would be over first, unless something waits for a frame.
   const hasten = () => {
-    if (frames || !pending.size) return;
-    advance(Math.min(...[...pending.values()].map(({ due }) => due)) - now());
+    const awaited = unreturning();
+    if (!frames && awaited.length) advance(Math.min(...awaited.map(({ due }) => due)) - now());
   };
   const setPace = (wanted) => {
     [ahead, pace, pacedAt] = [shift(), wanted, performance.now()];
     for (const number of pending.keys()) wait(number);
   };
-  const isQuiet = () => !pending.size && !frames;
+  const isQuiet = () => !unreturning().length && !frames;
   return { after, cancel, atFrame, advance, hasten, setPace, isQuiet };
 })();
 
