@@ -24,16 +24,20 @@ from explorer.mechanism.home import STEPS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.numerics.checks import MOST
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import drop_rounding, format_apart, format_number
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
-from explorer.prototype.sizes import FIRST_SWING, SECOND_SWING, THINNEST_LEG, Sizes, Stroke
+from explorer.prototype.sizes import (
+    FIRST_SWING,
+    SECOND_SWING,
+    SLACK,
+    THINNEST_LEG,
+    Sizes,
+    Stroke,
+)
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
 BALL_SWING = math.radians(85.0)
 """Largest angle between a leg and the normal of the platform."""
-
-# A pose at the end of a stroke is within it up to rounding.
-_SLACK = 1e-9
 
 
 def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
@@ -46,9 +50,9 @@ def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) 
     joints = sizes.chains.joints(position, rotation)
     broken = [*_strokes(sizes, joints), *_swings(sizes, joints, position, rotation)]
     for axes, distance, needed in sizes.leg_distances(position, rotation):
-        if distance < needed * (1.0 - _SLACK):
-            apart = format_number(distance, size=needed)
-            broken.append(f"{axes} are {apart} mm apart and need {format_number(needed)} mm")
+        if distance < needed * (1.0 - SLACK):
+            apart, need = _beyond(distance, needed)
+            broken.append(f"{axes} are {apart} mm apart and need {need} mm")
     return tuple(broken)
 
 
@@ -56,21 +60,26 @@ def _strokes(sizes: Sizes, joints: FloatArray) -> Iterator[str]:
     unit = sizes.design.unit_mm
     for leg, (low, high) in zip(LEGS, sizes.strokes, strict=True):
         length = float(joints_of_leg(joints, leg)[-1]) * unit
-        if not low * (1.0 - _SLACK) <= length <= high * (1.0 + _SLACK):
-            stroke = f"{format_number(low)} to {format_number(high)} mm"
-            yield f"leg {leg} is {format_number(length, size=high)} mm long, its stroke is {stroke}"
+        if not low * (1.0 - SLACK) <= length <= high * (1.0 + SLACK):
+            own, least, most = _beyond(length, low, high)
+            yield f"leg {leg} is {own} mm long, its stroke is {least} to {most} mm"
     places = [float(joints_of_leg(joints, leg)[0]) * unit for leg in ON_GUIDE]
     for leg, place in zip(ON_GUIDE, places, strict=True):
         low, high = sizes.carriage_ranges[leg]
-        if not low - _SLACK * abs(low) <= place <= high + _SLACK * abs(high):
-            rail = f"{format_number(low)} to {format_number(high)} mm"
-            at = format_number(place, size=high - low)
-            yield f"carriage {leg} is at {at} mm, its rail is {rail}"
+        if not low - SLACK * abs(low) <= place <= high + SLACK * abs(high):
+            at, first, last = _beyond(place, low, high)
+            yield f"carriage {leg} is at {at} mm, its rail is {first} to {last} mm"
     distance, needed = places[0] - places[1], sizes.between_carriages
     at_home = sizes.carriage_at_home(2) - sizes.carriage_at_home(3)
-    if math.copysign(1.0, at_home) * distance < needed * (1.0 - _SLACK):
-        apart = format_number(abs(distance), size=needed)
-        yield f"carriages 2 and 3 are {apart} mm apart and need {format_number(needed)} mm"
+    if math.copysign(1.0, at_home) * distance < needed * (1.0 - SLACK):
+        apart, need = _beyond(abs(distance), needed)
+        yield f"carriages 2 and 3 are {apart} mm apart and need {need} mm"
+
+
+def _beyond(length: float, *bounds: float) -> list[str]:
+    """Return a length and the bounds that it exceeds as numbers that differ."""
+    size = max(map(abs, bounds))
+    return format_apart((drop_rounding(length, size), *bounds), 4, format_number)
 
 
 def _swings(
@@ -79,7 +88,7 @@ def _swings(
     for leg, point in ((1, "a1"), (4, "a3")):
         first, second, _ = np.abs(joints_of_leg(joints, leg)).tolist()
         for angle, most in ((first, FIRST_SWING), (second, SECOND_SWING)):
-            if angle > most + _SLACK:
+            if angle > most + SLACK:
                 yield f"the universal joint at {point} leans {_angle_beyond(angle, most)}"
     for leg in ON_GUIDE:
         _, angle, _ = np.abs(joints_of_leg(joints, leg)).tolist()
@@ -90,7 +99,7 @@ def _swings(
     for leg in LEGS:
         along = places.rotation[BODIES.index(f"rod {leg}")][:, 2]
         lean = math.acos(float(np.clip(along @ normal, -1.0, 1.0)))
-        if lean > BALL_SWING + _SLACK:
+        if lean > BALL_SWING + SLACK:
             yield f"the ball joint at b{leg} leans {_angle_beyond(lean, BALL_SWING)}"
 
 
@@ -175,34 +184,33 @@ def sizes_of(design: Design) -> Sizes:
     return built.sizes
 
 
-def _sizes(
-    design: Design, unit: float = 1.0, factor: float = 1.0, open_share: float = 0.0
-) -> Sizes:
-    """Return sizes with factors on the unit and on the radii that the design states.
+def _sizes(design: Design, unit: float = 1.0, open_share: float = 0.0) -> Sizes:
+    """Return sizes with a factor on the unit.
 
-    The other legs have a share of the largest radius, and at least the least one.
+    Legs without a radius have a share of the largest one, and at least the least one.
     """
     larger = msgspec.structs.replace(design, unit_mm=unit * design.unit_mm)
     thickest = open_share * THICKEST_SHARE * design.reach * larger.unit_mm
-    radii = (factor * larger.unit_mm * radius for radius in design.limits.leg_radii)
+    radii = (larger.unit_mm * radius for radius in design.limits.leg_radii)
     return Sizes(larger, tuple(radius or max(thickest, THINNEST_LEG) for radius in radii))
 
 
 def _problems(sizes: Sizes) -> Iterator[str]:
     """Yield what prevents parts of these sizes from being assembled in the home pose."""
     if sizes.worst is not None:
-        parts, distance, needed = sizes.worst
+        parts, *lengths = sizes.worst
+        distance, needed = format_apart(lengths, 3)
         if parts.startswith("the radius"):
-            yield f"{parts} is {_mm(distance)} and must be at least {_mm(needed)}"
+            yield f"{parts} is {distance} mm and must be at least {needed} mm"
         else:
-            yield f"{parts} are {_mm(distance)} apart and need {_mm(needed)}"
+            yield f"{parts} are {distance} mm apart and need {needed} mm"
     for leg in LEGS:
         low, high = sizes.required_stroke(leg)
         # A home pose on a limit is within it, whatever its rounding.
-        if not low * (1.0 - _SLACK) <= sizes.home_length(leg) <= high * (1.0 + _SLACK):
+        if not low * (1.0 - SLACK) <= sizes.home_length(leg) <= high * (1.0 + SLACK):
+            length, least, most = format_apart((sizes.home_length(leg), low, high), 4)
             yield (
-                f"leg {leg} is {sizes.home_length(leg):.4g} mm long at home, but its limits are "
-                f"{low:.4g} to {high:.4g} mm"
+                f"leg {leg} is {length} mm long at home, but its limits are {least} to {most} mm"
             )
     home = sizes.design.home_pose
     for swing in _swings(sizes, sizes.home_joints, home.position, home.rotation):
@@ -224,7 +232,11 @@ def _mend(sizes: Sizes) -> Design | None:
     factor = _least(lambda unit: fitting(unit) is not None, 1.0, most)
     if factor is None:
         return None
-    unit_mm = design.unit_mm if factor == 1.0 else _round(factor * design.unit_mm, up=True)
+    unit_mm = design.unit_mm
+    if factor > 1.0:
+        unit_mm = _roundest(
+            lambda each: fitting(each / design.unit_mm) is not None, factor * unit_mm, up=True
+        )
     remedy = fitting(unit_mm / design.unit_mm)
     return remedy and msgspec.structs.replace(remedy, unit_mm=unit_mm)
 
@@ -268,23 +280,38 @@ def _advice(design: Design, remedy: Design | None) -> str:
         ways.append(" and ".join(filter(None, (larger, home))))
     radii = [radius * unit for radius in design.limits.leg_radii if radius]
     if radii:
-        least = (1.0 + _SLACK) * THINNEST_LEG / min(radii)
-
-        def fits(factor: float) -> bool:
-            return not any(_problems(_sizes(design, factor=factor)))
-
-        thinner = _least(lambda f: fits(1.0 / f), 1.0, 1.0 / least) if least < 1.0 else None
-        if thinner is not None:
-            ways.append(f"legs of radius at most {_round(max(radii) / thinner, up=False):.6g} mm")
-        elif least > 1.0 and fits(least):
-            ways.append(f"legs of radius at least {_round(max(radii) * least, up=True):.6g} mm")
+        ways += _fitting_radii(design, min(radii), max(*radii, THINNEST_LEG))
     if ways:
         return f"it fits with {' or '.join(ways)}"
     return "no unit makes that fit: take thinner legs, another home, or points farther apart"
 
 
-def _mm(value: float) -> str:
-    return f"{value:.3g} mm"
+def _fitting_radii(design: Design, thinnest: float, thickest: float) -> Iterator[str]:
+    """Yield the radii that stated ones may have so that the parts fit; nothing if none do.
+
+    The thinnest of the stated radii and the largest one to try are in millimetres.
+    """
+
+    def fits(most: float) -> bool:
+        least, unit = THINNEST_LEG, design.unit_mm
+        radii = (unit * radius for radius in design.limits.leg_radii)
+        within = tuple(radius and min(max(radius, least), most) / unit for radius in radii)
+        return not any(_problems(_sizes(design.with_limits(leg_radii=within))))
+
+    factor = _least(lambda f: fits(thickest / f), 1.0, thickest / THINNEST_LEG)
+    if factor is None:
+        return
+    least = f"at least {THINNEST_LEG:.6g} mm" * (thinnest < THINNEST_LEG)
+    most = ""
+    if factor > 1.0:
+        most = f"at most {_roundest(fits, thickest / factor, up=False):.6g} mm"
+    yield f"legs of radius {' and '.join(filter(None, (least, most)))}"
+
+
+def _roundest(fits: Callable[[float], bool], value: float, *, up: bool) -> float:
+    """Return the value of three digits next to one that fits, which fits too."""
+    nearest = float(f"{value:.3g}")
+    return nearest if fits(nearest) else _round(value, up)
 
 
 def _round(value: float, up: bool) -> float:

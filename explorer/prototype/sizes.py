@@ -28,6 +28,9 @@ CLEARANCE = 0.2
 THINNEST = 0.5
 """Thinnest wall, and smallest radius of a rod."""
 
+SLACK = 1e-9
+"""Share of a length by which rounding may miss it."""
+
 THINNEST_LEG = 2.0 * THINNEST + CLEARANCE
 """Smallest radius of a leg, with the thinnest wall about the thinnest rod."""
 
@@ -49,7 +52,7 @@ class Stroke(NamedTuple):
 
     def covers(self, required: Stroke) -> bool:
         """Whether it covers a required stroke, but for the last bits."""
-        slack = 1e-9 * required.longest
+        slack = SLACK * required.longest
         return (
             self.shortest <= required.shortest + slack and self.longest >= required.longest - slack
         )
@@ -305,5 +308,5 @@ class Sizes:
     @cached_property
     def worst(self) -> tuple[str, float, float] | None:
         """The place whose need exceeds its distance by the largest factor; None if all fit."""
-        tight = [place for place in self.tight_places() if place[1] < place[2]]
+        tight = [place for place in self.tight_places() if place[1] < place[2] * (1.0 - SLACK)]
         return max(tight, key=lambda place: place[2] / max(place[1], 1e-300), default=None)

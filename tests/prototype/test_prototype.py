@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -27,7 +28,7 @@ from explorer.prototype.assembly import Prototype, bill_of_materials, make_proto
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places, joints_of_leg
 from explorer.prototype.fitting import THICKEST_SHARE, broken_joint_limits, buildability
 from explorer.prototype.shapes import Part
-from explorer.prototype.sizes import CLEARANCE, LegSizes, Stroke
+from explorer.prototype.sizes import CLEARANCE, THINNEST_LEG, LegSizes, Stroke
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 HALF_TURN_X, HALF_TURN_Z = np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, -1.0, 1.0])
@@ -370,6 +371,10 @@ TIGHT = (
         "carriages 2 and 3 at home are 1.34 mm apart and need 2.6 mm",
     ),
     (limited(OPTIMAL, leg_radii=(0.03, 0.0, 0.2, 0.0)), "the radius of leg 1 is 0.3 mm"),
+    # Limits at round numbers: 12 mm and 1.2 mm fit.
+    (limited(OPTIMAL, leg_radii=(0.1, 0.1, 0.1, 0.1)), "unit of at least 12 mm or legs of"),
+    (limited(OPTIMAL, leg_radii=(0.1, 0.12, 0.14, 0.16)), "legs of radius at least 1.2 mm"),
+    (limited(OPTIMAL, leg_radii=(0.1, 0.4, 0.4, 0.3)), "at least 1.2 mm and at most 3.24 mm"),
     (
         msgspec.structs.replace(
             limited(UNBOXED, leg_radii=(0.15,) * 4), b1=(0.2, -0.25), b2=1.0, b3=4.9
@@ -387,11 +392,11 @@ TIGHT = (
 def test_design_too_tight_for_parts_names_what_would_fit(design: Design, words: str) -> None:
     message = refusal(make_prototype, design)
     assert words in message
-    built, unit = buildability(design), "unit of at least "
-    offers = "radius at most ", "radius at least "
+    built = buildability(design)
+    unit, at_least, at_most = "a unit of at least", "legs of radius at least", "at most"
     offered = {
-        phrase: float(message.partition(phrase)[2].split()[0].rstrip(";,"))
-        for phrase in (unit, *offers)
+        phrase: float(message.partition(f"{phrase} ")[2].split()[0])
+        for phrase in (unit, at_least, at_most)
         if phrase in message
     }
     assert offered or "no unit makes that fit" in message
@@ -399,10 +404,14 @@ def test_design_too_tight_for_parts_names_what_would_fit(design: Design, words: 
     if unit in offered:
         make_prototype(msgspec.structs.replace(design, unit_mm=offered[unit]))
         refusal(make_prototype, msgspec.structs.replace(design, unit_mm=0.98 * offered[unit]))
-    for phrase in set(offers) & set(offered):
-        factor = offered[phrase] / design.unit_mm / max(design.limits.leg_radii)
-        radii = tuple(factor * radius for radius in design.limits.leg_radii)
-        make_prototype(limited(design, leg_radii=radii))
+    assert offered.get(at_least, THINNEST_LEG) == THINNEST_LEG
+    for share, makes in ((1.0, make_prototype), (1.01, partial(refusal, make_prototype))):
+        if offered.keys() & {at_most, at_least}:
+            most = share * offered.get(at_most, math.inf)
+            least = offered.get(at_least, 0.0) / share
+            radii = (design.unit_mm * radius for radius in design.limits.leg_radii)
+            each = [radius and min(max(radius, least), most) / design.unit_mm for radius in radii]
+            makes(limited(design, leg_radii=tuple(each)))
 
 
 def test_offer_is_the_least_unit_at_which_any_open_radius_fits() -> None:
