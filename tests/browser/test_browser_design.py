@@ -197,3 +197,8 @@ def test_row_in_use_is_marked_in_the_sketch_and_its_hint_stands_beside_the_panel
         )
 
     tab.wait_for(is_beside, "the hint beside its row")
+    # Without the focus in a row, the pointer's is marked, which has not moved.
+    assert is_marked()
+    tab.field("b1x").blur()
+    tab.wait_for(lambda: not is_marked(), "no mark of the row that has lost the focus")
+    assert tab.page.evaluate("document.documentElement.dataset.at") == "b2"

@@ -86,10 +86,16 @@ window.explorer.names ??= (() => {
   new MutationObserver(nameSoon).observe(document.body, changes);
   nameAll();
   // What has the focus, or else the pointer, is named on the root: the stylesheet may point at it.
-  const mark = ({ target }) => {
-    const words = [document.activeElement, target].map(labelOf);
+  let pointed = null;
+  const mark = () => {
+    const words = [document.activeElement, pointed].map(labelOf);
     document.documentElement.dataset.at = words.find((each) => each) ?? "";
   };
-  for (const event of ["pointerover", "focusin", "focusout"]) addEventListener(event, mark, true);
+  const pointAt = ({ target }) => {
+    pointed = target;
+    mark();
+  };
+  addEventListener("pointerover", pointAt, true);
+  for (const event of ["focusin", "focusout"]) addEventListener(event, mark, true);
   return { labelOf };
 })();

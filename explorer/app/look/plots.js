@@ -18,6 +18,8 @@ window.explorer.plots ??= (() => {
   };
   const readingOf = (plot) => plot.closest(".ex-plot").parentElement.querySelector(".ex-reading");
   const show = (plot, words, path) => {
+    // Another drawing may have taken its place.
+    if (!plot.isConnected) return;
     const reading = readingOf(plot);
     reading.textContent = words || reading.dataset.hint;
     plot.querySelector(".near").setAttribute("d", path);
@@ -52,8 +54,9 @@ window.explorer.plots ??= (() => {
       pointer = asked = null;
     }
     if (!plot) return;
-    pointer = { plot, place: placeIn(plot, event) };
-    if (!asked) ask();
+    pointer = { plot, place: placeIn(plot, event), facts: plot.dataset.plot };
+    // The server does not answer for a study that has been closed meanwhile.
+    if (asked?.facts !== pointer.facts) ask();
   });
   const isDrag = ({ clientX, clientY }) =>
     Math.hypot(clientX - pressed.x, clientY - pressed.y) > DRAG_PIXELS;
