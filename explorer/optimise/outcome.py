@@ -128,13 +128,24 @@ class Outcome:
 
     @property
     def status(self) -> Status:
-        """Status of the best run."""
-        return self.run.status
+        """Status of the best run; cancelled if `stop` ended the search, in whichever run."""
+        last = self.runs[-1].status
+        return last if last == "cancelled" else self.run.status
 
     @property
     def converged(self) -> bool:
-        """Whether the best run converged."""
-        return self.run.status == "converged"
+        """Whether the search went on to its end, and the best run converged."""
+        return self.status == "converged"
+
+    @property
+    def message(self) -> str:
+        """Result in one line, with the demand that the best so far of a cancelled search misses."""
+        if self.status != "cancelled":
+            return self.run.message
+        words, last, best = self.run.message, len(self.runs), self.chosen + 1
+        if best < last:
+            words = f"cancelled in start {last}; the best so far is of start {best}, {words}"
+        return words + (f"; missed: {self.best.worst}" if self.best.spare < 0.0 else "")
 
     @property
     def best(self) -> Iterate:

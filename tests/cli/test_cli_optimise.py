@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from command_line import CommandLine
 
 import explorer
+from explorer.cli import INTERRUPTED
+from explorer.cli.streams import Meter
 from explorer.optimise.outcome import load_record
 
 COMMAND = ("optimise",)
@@ -74,6 +78,73 @@ def test_optimise_without_convergence_writes_no_design(cli: CommandLine, tmp_pat
     )
     assert "best so far" in page
     assert sorted(path.name for path in tmp_path.iterdir()) == ["design.json", "run.json"]
+
+
+@pytest.fixture
+def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Function that has this process send itself signals at an iterate, told by its progress."""
+
+    def use(words: str, number: int, count: int = 1) -> None:
+        def show(_meter: Meter, text: str, _share: float) -> None:
+            if words in text:
+                for _ in range(count):
+                    signal.raise_signal(number)
+
+        monkeypatch.setattr(Meter, "show", show)
+
+    return use
+
+
+REACH = ["--objective", "smallest-reach", "--starts", "5", "--least", "1"]
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_interrupted_search_writes_the_best_so_far_and_its_record(
+    cli: CommandLine, tmp_path: Path, interrupt: Callable[..., None], name: str
+) -> None:
+    number = getattr(signal, name, None)
+    if number is None:
+        pytest.skip("this system has no such signal")
+    usual = signal.getsignal(number)
+    out, kept = tmp_path / "design.json", tmp_path / "design.record.json"
+    interrupt("solving 4", number)
+    found = cli.answer(*PAPER, "--out", out, status=1)
+    assert signal.getsignal(number) == usual
+    assert (found["status"], found["converged"]) == ("cancelled", False)
+    assert found["files"] == [str(out), str(kept)]
+    design, record = explorer.load_design(str(out)), load_record(kept)
+    assert json.loads(explorer.encode_design(design)) == found["design"]
+    assert record.design.variables == design.variables
+    assert [run.status for run in record.runs] == ["cancelled"]
+    assert len(record.history) == 4
+    best = record.history[record.runs[0].best]
+    assert best.objective == found["objective"]
+    assert record.problem.design_at(best.values).variables == design.variables
+    # What it misses counts first, then the objective.
+    assert best == min(record.history, key=lambda it: (max(0.0, -it.spare), it.objective))
+    assert best.number > 0
+
+
+def test_search_interrupted_after_a_start_that_converged_is_no_whole_search(
+    cli: CommandLine, tmp_path: Path, interrupt: Callable[..., None]
+) -> None:
+    kept = tmp_path / "run.json"
+    interrupt("start 2 of 5, solving 3", signal.SIGTERM)
+    page, complaint = cli.run(*REACH, "--record", kept, status=1)
+    record = load_record(kept)
+    assert (record.chosen, [run.status for run in record.runs]) == (0, ["converged", "cancelled"])
+    words = "explorer: cancelled in start 2; the best so far is of start 1, converged: "
+    assert complaint.startswith(words)
+    assert "best so far" in page
+    assert str(kept) in page
+
+
+def test_second_interruption_ends_the_command_at_once(
+    cli: CommandLine, tmp_path: Path, interrupt: Callable[..., None]
+) -> None:
+    interrupt("solving 2", signal.SIGINT, 2)
+    assert cli.run(*REACH, "--out", tmp_path / "design.json", status=INTERRUPTED) == ("", "")
+    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize("json_too", [False, True])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +13,7 @@ from typing import Annotated
 import msgspec
 
 from explorer.cli import options, output, values
-from explorer.cli.streams import Meter
+from explorer.cli.streams import Interruption, Meter
 from explorer.errors import InputError, NoAnswerError
 from explorer.files.writing import check_writable
 from explorer.measures.catalogue import CATALOGUE, Measurements
@@ -32,7 +32,8 @@ class Optimise(options.JsonOptions, options.DesignOptions):
 
     The gradients are exact, and the search starts from a given design, whose limits hold
     throughout. The search converges if all demands hold at a local optimum; otherwise the exit
-    status is 1, and the output is the best iterate.
+    status is 1, and the output is the best iterate. Ctrl-C, or SIGTERM, ends it with the best so
+    far.
     """
 
     objective: ObjectiveName = "match-volume"
@@ -111,7 +112,8 @@ class Optimise(options.JsonOptions, options.DesignOptions):
     """Largest number of iterations per start."""
 
     out: Annotated[Path | None, values.FILE] = None
-    """File for the optimal design; the record of the search is written beside it."""
+    """File for the optimal design, or for the best so far of a search that is interrupted; the
+    record of the search is written beside it."""
 
     record: Annotated[Path | None, values.hint("default: OUT with .record.json", "FILE")] = None
     """File for the record: problem, history and versions, written even without convergence."""
@@ -130,14 +132,16 @@ class Optimise(options.JsonOptions, options.DesignOptions):
             check_writable(record)
         problem, settings = self._problem()
         self._check_possible(problem)
-        outcome = _search(problem, settings)
-        files: dict[Path, bytes] = {}
-        if self.out is not None and outcome.converged:
-            files[self.out] = encode_design(optimised_design(outcome))
-        if record is not None and (outcome.converged or self.record is not None):
-            files[record] = outcomes.encode_record(outcomes.record_of(outcome, settings))
-        written, unwritten = options.write_files(files)
-        unsolved = [] if outcome.converged else [NoAnswerError(outcome.run.message)]
+        with Interruption() as interruption:
+            outcome = _search(problem, settings, lambda: interruption.is_asked)
+            is_kept = outcome.status in ("converged", "cancelled")
+            files: dict[Path, bytes] = {}
+            if self.out is not None and is_kept:
+                files[self.out] = encode_design(optimised_design(outcome))
+            if record is not None and (is_kept or self.record is not None):
+                files[record] = outcomes.encode_record(outcomes.record_of(outcome, settings))
+            written, unwritten = options.write_files(files)
+        unsolved = [] if outcome.converged else [NoAnswerError(outcome.message)]
         self.write(
             lambda: outcome_json(outcome, written),
             outcome_lines(outcome, written),
@@ -207,8 +211,10 @@ class Optimise(options.JsonOptions, options.DesignOptions):
         raise NoAnswerError(message)
 
 
-def _search(problem: Problem, settings: outcomes.Settings) -> outcomes.Outcome:
-    """Run a search with a progress bar."""
+def _search(
+    problem: Problem, settings: outcomes.Settings, stop: Callable[[], bool]
+) -> outcomes.Outcome:
+    """Run a search with a progress bar, until it ends or is to stop."""
     starts, steps = settings.starts, Counter[int]()
     symbol = outcomes.OBJECTIVE_SYMBOLS[problem.objective]
 
@@ -227,6 +233,7 @@ def _search(problem: Problem, settings: outcomes.Settings) -> outcomes.Outcome:
             seed=settings.seed,
             iterations=settings.iterations,
             watch=show,
+            stop=stop,
         )
 
 
@@ -263,8 +270,8 @@ def outcome_json(outcome: outcomes.Outcome, written: Sequence[Path]) -> dict[str
         "reach": outcome.design.reach,
         "longest_leg": longest_leg(outcome.design),
         **output.attributes(run, "iterations evaluations"),
-        **output.attributes(outcome, "seconds converged"),
-        **output.attributes(run, "status holding message"),
+        **output.attributes(outcome, "seconds converged status message"),
+        "holding": run.holding,
         "values": dict(zip(problem.names, best.values, strict=True)),
         "runs": [
             {
@@ -311,7 +318,7 @@ def outcome_lines(outcome: outcomes.Outcome, written: Sequence[Path]) -> Iterato
         change = f"{finite[1] - finite[0]:+.6g}" if len(finite) == len(pair) else ""
         rows.append((name, *map(_cell, pair), change))
     if outcome.converged:
-        yield from (outcome.run.message, "")
+        yield from (outcome.message, "")
     yield output.table(rows, "<>>>")
     yield (
         f"\n{len(outcome.runs)} start{'s' if len(outcome.runs) > 1 else ''}, "

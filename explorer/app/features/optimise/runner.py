@@ -156,11 +156,10 @@ class Optimiser(Runner):
 def result_of(run: SearchRun, ending: Outcome | str, iterates: tuple[Iterate, ...]) -> SearchResult:
     """Return the result of a run by its outcome, or without one by its iterates or a problem."""
     if isinstance(ending, Outcome):
-        best = ending.run
         return SearchResult(
-            status=best.status,
-            message=best.message,
-            best=best.best,
+            status=ending.status,
+            message=ending.message,
+            best=ending.best,
             starts=len(ending.runs),
             converged=sum(tried.status == "converged" for tried in ending.runs),
             seconds=ending.seconds,
