@@ -70,11 +70,10 @@ def make_problem(
     for variable in bounds:
         first = given.setdefault(variable.name, variable)
         if first is not variable:
-            ends = (first.low, first.high, variable.low, variable.high)
-            low, high, least, most = format_apart(ends)
+            ends = format_apart((first.low, first.high, variable.low, variable.high))
+            one, other = (" to ".join(pair) for pair in (ends[:2], ends[2:]))
             raise InputError(
-                f"{variable.name} is bounded twice, from {low} to {high} and from {least} to "
-                f"{most}: give it one range"
+                f"{variable.name} is bounded twice, from {one} and from {other}: give it one range"
             )
     names = [*VARIABLES, *free, *(name for name in given if name not in VARIABLES)]
     variables = [given.get(name) or default_variable(start, name) for name in dict.fromkeys(names)]
