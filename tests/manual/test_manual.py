@@ -31,6 +31,8 @@ from explorer.errors import InputError
 from explorer.files.extras import EXTRAS
 from explorer.files.packaged import list_pages, read_page
 from explorer.optimise.problem import OBJECTIVES
+from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.accessible.workspace import accessible_workspace
 
 ROOT = Path(__file__).resolve().parents[2]
 MANUAL = Path(explorer.__file__).parents[1] / "assets" / "manual"
@@ -166,6 +168,7 @@ class Reader:
         stack: Where processes are ended.
         as_processes: Whether each command is a process, as for a user; else it runs in this one.
         output: What the last shell block printed; None if it was only parsed.
+        printed: What all blocks so far have printed.
         names: The names of the Python blocks.
         port: The port that stands for the scheduler's.
     """
@@ -174,6 +177,7 @@ class Reader:
     stack: ExitStack
     as_processes: bool
     output: str | None = ""
+    printed: str = ""
     names: dict[str, Any] = field(default_factory=dict[str, Any])
     port: int = field(default_factory=find_port)
 
@@ -182,6 +186,7 @@ class Reader:
         if kind == "sh":
             printed = [self.enter(line) for line in text.replace("\\\n", " ").splitlines()]
             self.output = None if None in printed else "".join(map(str, printed))
+            self.printed += self.output or ""
         elif kind == "python":
             imported = re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE)
             if all(find_spec(name) for name in OTHER_READERS.intersection(imported)):
@@ -195,6 +200,14 @@ class Reader:
             if kind == "json":
                 msgspec.json.decode(text)
             Path(file).write_text(text, encoding="utf-8")
+
+    def compare_tables(self, text: str) -> None:
+        """Check that the decimals in tables of a text are printed numbers, rounded."""
+        found = [abs(float(number)) for number in re.findall(r"\d+\.\d+", self.printed)]
+        for row in () if self.name in MEASURED else re.findall(r"^\|.*\|$", text, re.MULTILINE):
+            for number in re.findall(r"\d+\.\d\d+", row):
+                decimals = len(number.partition(".")[2])
+                assert float(number) in {round(each, decimals) for each in found}, (number, row)
 
     def enter(self, line: str) -> str | None:
         """Run a line of a shell and return what it printed."""
@@ -325,6 +338,28 @@ def test_document_examples_run(
     with ExitStack() as stack:
         reader = Reader(name, stack, as_processes)
         for block in BLOCK.finditer(text):
+            reader.compare_tables(text[last : block.start()])
             reader.follow(block[1], block[2], text[last : block.start()])
             last = block.end()
+        reader.compare_tables(text[last:])
     assert text.count("```") == 2 * len(BLOCK.findall(text))
+
+
+@pytest.mark.parametrize(("name", "column"), [("paper-initial", 1), ("paper-optimal", 3)])
+def test_table_of_accessible_volumes_is_that_of_the_library(name: str, column: int) -> None:
+    table = read("workspace.md").partition("| radius of all legs |")[2].partition("\n\n")[0]
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in table.splitlines()[2:]]
+    assert len(rows) == 5
+    for radius, volume, nodes in ([row[0], *row[column : column + 2]] for row in rows):
+        design = with_radius(explorer.PRESETS[name], float(radius))
+        if volume == "–":
+            with pytest.raises(InputError, match=r"legs 2 and 3 overlap .* no valid position"):
+                accessible_workspace(design)
+            continue
+        found = accessible_workspace(design)
+        share = f"{100.0 * found.accessible_volume / found.volume:.1f} %"
+        assert volume in (share, f"{found.accessible_volume:.6g}")
+        assert nodes in (
+            f"{found.accessible_node_count}",
+            f"{found.accessible_node_count} of {found.node_count} nodes",
+        )
