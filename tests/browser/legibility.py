@@ -96,6 +96,31 @@ READ = """(within) => {
     return texts;
 }"""
 
+# The contrast of elements with the page: of a drawing, of a gradient, or of a background.
+MARK_CONTRASTS = """(selector) => {
+    const pen = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+    const page = getComputedStyle(document.body).backgroundColor;
+    const luminance = (colour) => {
+        for (const each of [page, colour]) {
+            pen.fillStyle = each;
+            pen.fillRect(0, 0, 1, 1);
+        }
+        const parts = [...pen.getImageData(0, 0, 1, 1).data].slice(0, 3).map((value) =>
+            value <= 10 ? value / 3294 : ((value / 255 + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2];
+    };
+    const [of, part] = selector.split("::");
+    return [...document.querySelectorAll(of)].filter((each) => each.checkVisibility())
+        .map((each) => {
+            const style = getComputedStyle(each, part && `::${part}`);
+            const { color, backgroundColor, backgroundImage } = style;
+            const first = backgroundImage.match(/(?:rgb|color)a?\\([^)]*\\)/)?.[0];
+            const own = each instanceof SVGElement ? color : first ?? backgroundColor;
+            const [high, low] = [own, page].map(luminance).sort((a, b) => b - a);
+            return (high + 0.05) / (low + 0.05);
+        });
+}"""
+
 
 @dataclass(frozen=True)
 class Text:
@@ -146,3 +171,13 @@ def open_folders(page: Page) -> None:
     )
     while folder := next((each for each in closed.all() if each.is_visible()), None):
         folder.click()
+
+
+def mark_contrasts(page: Page, selector: str) -> list[float]:
+    """Return the ratios of contrast of what is seen by its shape alone with the page behind it.
+
+    Args:
+        page: The page.
+        selector: Selector of the elements, of their ::before or ::after if it ends with that.
+    """
+    return page.evaluate(MARK_CONTRASTS, selector)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -41,6 +41,21 @@ HAS_BOXES = """() => {
         if (each.material?.uniforms?.uLabelData) parent = each.parent;
     });
     return parent.visible;
+}"""
+# Where both canvases are, within a narrower room, as on paper, before any script knows of it.
+ON_PAPER = """() => {
+    const scene = document.querySelector("canvas[data-engine]"),
+        labels = scene.nextElementSibling,
+        { style } = labels.offsetParent;
+    const before = style.cssText;
+    style.width = "50%";
+    const found = [scene, labels].map((each) => {
+        const { x, y, width, height } = each.getBoundingClientRect();
+        const fit = getComputedStyle(each).objectFit;
+        return { box: [x, y, width, height], fit, ratio: each.width / each.height };
+    });
+    style.cssText = before;
+    return found;
 }"""
 BARE = View(
     flags=False,
@@ -355,3 +370,16 @@ def test_mesh_changed_as_its_shadow_is_switched_off_is_drawn_anew(wide: Tab) -> 
         # The explorer has lights of its own.
         viser.scene.configure_default_lights(enabled=False, cast_shadow=False)
         mesh.remove()
+
+
+@pytest.mark.parametrize("media", ["print", "screen"])
+def test_labels_lie_on_their_points_whatever_room_paper_leaves_the_scene(
+    wide: Tab, media: Literal["print", "screen"]
+) -> None:
+    wide.page.emulate_media(media=media)
+    wide.settle()
+    scene, labels = wide.page.evaluate(ON_PAPER)
+    wide.page.emulate_media(media="screen")
+    assert scene == labels
+    # All of the scene is on the paper, in its own proportions.
+    assert media == "screen" or scene["fit"] == "contain"

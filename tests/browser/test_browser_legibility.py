@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from legibility import Text, open_folders, texts_of
+from legibility import Text, mark_contrasts, open_folders, texts_of
 from playwright.sync_api import expect
 from tab import Tab
 
@@ -18,6 +18,19 @@ SIZES = {11.0, 12.5, 15.0, 20.0}
 # Sizes are computed in floating point.
 ROUNDING = 0.02
 DIALOG = "[role=dialog]"
+SCHEME = "document.documentElement.dataset.mantineColorScheme"
+# Least contrast of what is seen by its shape, as WCAG 2 demands it of controls. Numbers stand by
+# meters, and names beside swatches.
+MARKS = {
+    ".mantine-Slider-thumb:not([data-disabled])": 3.0,
+    ".mantine-Slider-track::before": 3.0,
+    ".multi-slider:not(.disabled) .multi-slider-thumb": 3.0,
+    ".multi-slider-track": 3.0,
+    "[data-checked] .mantine-Checkbox-icon": 3.0,
+    ".ex-chip[aria-pressed=true]": 3.0,
+    ".ex-meter": 1.5,
+    ".ex-swatch": 1.5,
+}
 ROLES = {"slider", "spinbutton", "textbox", "searchbox", "combobox", "checkbox", "button", "tab"}
 
 
@@ -63,9 +76,9 @@ def nameless(tab: Tab) -> list[str]:
 def test_text_is_legible_and_every_control_named_in_all_tabs_and_dialogs(
     tab: Tab, *, dark: bool
 ) -> None:
-    tab.page.emulate_media(color_scheme="dark" if dark else "light")
-    scheme = "document.documentElement.dataset.mantineColorScheme"
-    tab.wait_for(lambda: tab.page.evaluate(scheme) == ("dark" if dark else "light"), "the theme")
+    scheme = "dark" if dark else "light"
+    tab.page.emulate_media(color_scheme=scheme)
+    tab.wait_for(lambda: tab.page.evaluate(SCHEME) == scheme, "the theme")
     sizes: dict[float, str] = {}
     count = 0
 
@@ -127,6 +140,24 @@ def test_control_has_the_words_beside_it_as_its_name_whenever_it_comes(tab: Tab)
     tab.page.get_by_text("The unit must be positive; got 0").wait_for()
     tab.settle()
     assert nameless(tab) == []
+
+
+def test_forced_colours_leave_sliders_ticks_and_choices_to_be_seen(tab: Tab) -> None:
+    """As in Windows' high contrast, whose own colours replace those of texts and backgrounds."""
+    tab.turn_to("Design")
+    tab.unfold("Limits (units)")
+    # Chosen of several there, and in the menu over the scene.
+    tab.open_dialog("Overlays")
+    tab.settle()
+    for scheme in ("light", "dark"):
+        tab.page.emulate_media(forced_colors="active", color_scheme=scheme)
+        tab.wait_for(lambda scheme=scheme: tab.page.evaluate(SCHEME) == scheme, "the theme")
+        tab.settle()
+        for selector, least in MARKS.items():
+            contrasts = mark_contrasts(tab.page, selector)
+            assert contrasts, selector
+            assert min(contrasts) >= least, (scheme, selector, contrasts)
+    tab.page.emulate_media(forced_colors="none", color_scheme="light")
 
 
 @pytest.mark.long

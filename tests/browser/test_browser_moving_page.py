@@ -10,6 +10,8 @@ import msgspec
 import numpy as np
 import pytest
 from exported_designs import in_mm, limited_design, poses_about_home, random_poses, size_of
+from legibility import mark_contrasts
+from likeness import decoded
 from numpy.testing import assert_allclose
 from playwright.sync_api import Browser, Page, expect
 
@@ -224,3 +226,16 @@ def test_moving_page_without_webgl_says_so_and_has_its_numbers(page: Page, tmp_p
     page.keyboard.press("Enter")
     expect(page.locator("#margin-brief")).to_have_text("δ2 = −114.8 mm")
     expect(page.locator("#scale")).to_contain_text("no WebGL 2")
+
+
+def test_forced_colours_leave_sliders_and_choices_of_the_moving_page_to_be_seen(
+    page: Page, tmp_path: Path
+) -> None:
+    open_page(page, OPTIMAL, tmp_path)
+    for scheme in ("light", "dark"):
+        page.emulate_media(forced_colors="active", color_scheme=scheme)
+        for chosen in (":checked + span", "#modes [aria-pressed=true]"):
+            assert min(mark_contrasts(page, chosen)) >= 3.0, (scheme, chosen)
+        slider = decoded(page.locator("#sliders input[type=range]").first.screenshot())
+        # Page, track, the part within the limits, and thumb.
+        assert len(np.unique(slider.reshape(-1, slider.shape[-1]), axis=0)) > 3

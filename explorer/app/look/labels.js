@@ -298,8 +298,8 @@ window.explorer.labels ??= (() => {
   };
 
   const canvas = document.createElement("canvas");
-  canvas.style.cssText =
-    "position:absolute;inset:0;width:100%;height:100%;pointer-events:none;color:var(--ex-ring)";
+  canvas.className = "ex-labels";
+  canvas.style.cssText = "position:absolute;inset:0;pointer-events:none;color:var(--ex-ring)";
   // A picture of the scene alone hides what is not its canvas.
   canvas.style.setProperty("visibility", "visible", "important");
   let drawn = [],
@@ -318,6 +318,8 @@ window.explorer.labels ??= (() => {
     // A canvas that takes a size is cleared and loses its pen's properties.
     if (canvas.width !== sides[0] || canvas.height !== sides[1]) {
       [canvas.width, canvas.height] = sides;
+      // Paper may have another room for the scene, whose canvas keeps its size there.
+      [canvas.style.width, canvas.style.height] = [`${width}px`, `${height}px`];
     }
     const pen = canvas.getContext("2d");
     pen.setTransform(1, 0, 0, 1, 0, 0);
