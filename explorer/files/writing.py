@@ -11,6 +11,7 @@ import contextlib
 import errno
 import io
 import os
+import shutil
 import sys
 import time
 import uuid
@@ -56,18 +57,22 @@ def check_writable(path: Path) -> None:
 def write_whole(path: Path, data: bytes) -> None:
     """Write or replace a file atomically: no reader sees a part of its contents.
 
+    A file that replaces another one has its permissions.
+
     Raises:
         StorageError: The file cannot be written; one that existed is unchanged.
     """
     with _storage_errors("write", path):
         scratch = _scratch_path(path)
+        # A link stays a link, and its target is replaced.
+        target = _target_of(path)
         try:
             with scratch.open("xb") as file:
+                if target.exists():
+                    shutil.copymode(target, scratch)
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            # A link stays a link, and its target is replaced.
-            target = _target_of(path)
             _replace(scratch, target)
             _sync_folder(target.parent)
         finally:

@@ -32,6 +32,9 @@ MOST_WORKERS = 1024
 # Libraries of linear algebra read these when they are loaded. Matrices are small here, and
 # the processes many.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+# Python reads this when it starts, and imports nothing from the working folder then, where a file
+# may have the name of a library. The process has the paths of its parent before its first task.
+SAFE_PATH = "PYTHONSAFEPATH"
 
 # Failed starts in a row after which a task fails.
 STARTS = 10
@@ -175,7 +178,7 @@ class ChildProcess:
         self.process: SpawnProcess = context.Process(
             target=_answer_calls, args=(child_end,), name="explorer worker", daemon=True
         )
-        with _environment, _one_thread_each():
+        with _environment, _own_environment():
             self.process.start()
         # While the parent holds the child's end too, it does not see the child close it.
         child_end.close()
@@ -211,13 +214,14 @@ def cores() -> int:
 
 
 @contextlib.contextmanager
-def _one_thread_each() -> Generator[None]:
-    """Limit processes started within a `with` block to one thread each.
+def _own_environment() -> Generator[None]:
+    """Limit processes started within a `with` block to one thread and to a safe path each.
 
     Their environment must say so from the start, since they import the user's script first.
     """
-    previous = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    names = (*ONE_THREAD, SAFE_PATH)
+    previous = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
     try:
         yield
     finally:

@@ -174,6 +174,22 @@ def test_link_that_leads_nowhere_is_named_with_its_target(
     assert link.is_symlink()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such modes")
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o755, 0o444])
+def test_written_file_keeps_the_mode_of_the_one_that_it_replaces(tmp_path: Path, mode: int) -> None:
+    path, link, fresh = (tmp_path / name for name in ("file", "link", "fresh"))
+    path.write_bytes(b"old")
+    path.chmod(mode)
+    link.symlink_to(path)
+    for data, written in ((b"new", path), (b"newer", link)):
+        write_whole(written, data)
+        assert path.read_bytes() == data
+        assert stat.S_IMODE(path.stat().st_mode) == mode
+    (tmp_path / "other").touch()
+    write_whole(fresh, b"")
+    assert fresh.stat().st_mode == (tmp_path / "other").stat().st_mode
+
+
 def test_write_to_a_link_makes_its_missing_target(tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to("target")

@@ -504,6 +504,16 @@ def test_local_workers_that_start_side_by_side_leave_the_environment_as_it_was()
     assert dict(os.environ) == before
 
 
+def test_local_workers_import_nothing_from_the_working_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("types", "signal", "numpy"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('not the library')\n")
+    monkeypatch.chdir(tmp_path)
+    with LocalWorkers(1) as workers:
+        assert workers.submit(abs, -1).result() == 1
+
+
 def test_local_workers_return_results_raise_errors_and_survive_deaths() -> None:
     with LocalWorkers(2) as workers:
         assert [f.result() for f in [workers.submit(pow, k, 2) for k in range(9)]] == [
