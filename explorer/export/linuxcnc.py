@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from string import Template
 
 import numpy as np
@@ -20,6 +21,7 @@ from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import drop_rounding
 from explorer.workspace.limits.valid_poses import violations
 
 LINUXCNC_FILES = (
@@ -37,6 +39,12 @@ ANGLES = ((-360.0, 360.0), (-90.0, 90.0), (-360.0, 360.0))
 # Seconds in which X, Y and Z cross the reach, and in which axes and joints come to their speed.
 CROSS_SECONDS, START_SECONDS = 8.0, 0.1
 
+# X, Y and Z may cut corners by the reach over this number.
+BLENDS = 20_000.0
+
+# Significant digits of the larger end of a range; both are rounded outwards.
+LIMIT_DIGITS = 12
+
 # No joint is faster than three times X, Y and Z, even if all six axes move at their speeds at once.
 JOINT_SPEED_RATIO = 3.0
 
@@ -51,10 +59,11 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
     pose, unit = design.home_pose, design.unit_mm
     home = unit * inverse(design, pose.position, pose.rotation)
     angles = yaw_pitch_roll_from_rotation(pose.rotation)[::-1]
-    world = list(map(_number, (*(unit * np.array(pose.position)), *angles)))
+    at = np.array([*(unit * np.array(pose.position)), *angles])
+    world = list(map(_number, at, [*3 * [unit * design.reach], *3 * [360.0]]))
     axes, joints = axis_ranges(design), joint_ranges(design)
     linear, angular = axis_speeds(design)
-    speeds = 3 * [linear] + 3 * [angular]
+    speeds, slack = 3 * [linear] + 3 * [angular], unit * design.tolerance
     fields = {
         "name": design.name,
         "version": __version__,
@@ -63,6 +72,7 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
         "names": "\n".join(f'    "{name.lower().replace("_", " ")}",' for name in LIMIT_NAMES),
         "home": " ".join(world),
         "move": " ".join(map("".join, zip(AXES, world, strict=True))),
+        "blend": _number(float(f"{unit * design.reach / BLENDS:.1g}")),
         "linear": _number(linear),
         "angular": _number(angular),
         "jog": _number(linear / 2.0),
@@ -71,15 +81,17 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
         "joint": _number(JOINT_SPEED_RATIO * linear),
         "linear_acceleration": _number(linear / START_SECONDS),
         "angular_acceleration": _number(angular / START_SECONDS),
-        "axis_rows": _table(AXES, axes, world),
-        "joint_rows": _table(JOINTS, joints, map(_number, home)),
+        "axis_rows": _table(AXES, axes, at),
+        "joint_rows": _table(JOINTS, joints, home),
         "axis_sections": "\n".join(
-            f"[AXIS_{axis}]\n{_range_lines(row, speed)}"
-            for axis, row, speed in zip(AXES, axes, speeds, strict=True)
+            f"[AXIS_{axis}]\n{_range_lines(row, each, speed)}"
+            for axis, row, each, speed in zip(
+                AXES, axes, 3 * [slack] + 3 * [0.0], speeds, strict=True
+            )
         ),
         "joint_sections": "\n".join(
             f"[JOINT_{index}]\n# {name}\nTYPE = LINEAR\n"
-            f"{_range_lines(row, JOINT_SPEED_RATIO * linear)}"
+            f"{_range_lines(row, slack, JOINT_SPEED_RATIO * linear)}"
             f"HOME = {_number(at)}\nHOME_OFFSET = {_number(at)}\nHOME_SEQUENCE = 0\n"
             for index, (name, row, at) in enumerate(zip(JOINTS, joints, home, strict=True))
         ),
@@ -151,22 +163,36 @@ def _check_home(design: Design) -> None:
         )
 
 
-def _number(value: float) -> str:
-    """Return millimetres or degrees without noise, to a millionth."""
-    return f"{round(value, 6) + 0.0:.12g}"
+def _number(value: float, size: float = 0.0, digits: int = 15) -> str:
+    """Return a number of significant digits without a power of ten, which G-code cannot have.
+
+    The size is that of the numbers from which it was computed, see `drop_rounding`.
+    """
+    value = drop_rounding(value, size)
+    return np.format_float_positional(value, digits, fractional=False, trim="-")
 
 
-def _range_lines(row: FloatArray, speed: float) -> str:
-    low, high = map(_number, row)
+def _range_lines(row: FloatArray, slack: float, speed: float) -> str:
+    """Return the lines of a range and of a speed.
+
+    The range is wider by the slack and rounded outwards, so that a home pose at an end lies in it.
+    """
+    decimals = LIMIT_DIGITS - 1 - math.floor(math.log10(max(slack, *np.abs(row))))
+    low, high = (
+        f"{Decimal(float(end)).quantize(Decimal(1).scaleb(-decimals), rounding).normalize() + 0:f}"
+        for end, rounding in ((row[0] - slack, ROUND_FLOOR), (row[1] + slack, ROUND_CEILING))
+    )
     return (
         f"MIN_LIMIT = {low}\nMAX_LIMIT = {high}\n"
         f"MAX_VELOCITY = {_number(speed)}\nMAX_ACCELERATION = {_number(speed / START_SECONDS)}\n"
     )
 
 
-def _table(names: Iterable[str], ranges: FloatArray, home: Iterable[str]) -> str:
+def _table(names: Iterable[str], ranges: FloatArray, home: FloatArray) -> str:
     """Return rows of a text: the name, the least value, that at home, the greatest."""
+    rows = np.column_stack([ranges[:, 0], home, ranges[:, 1]])
+    sizes = np.abs(rows).max(axis=1)
     return "\n".join(
-        f"    {name:<5}{_number(low):>14}{at:>14}{_number(high):>14}"
-        for name, (low, high), at in zip(names, ranges, home, strict=True)
+        f"    {name:<5}{''.join(f'{_number(each, size, 9):>14}' for each in row)}"
+        for name, row, size in zip(names, rows, sizes, strict=True)
     )

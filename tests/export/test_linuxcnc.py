@@ -134,6 +134,57 @@ def test_no_joint_is_faster_than_its_speed() -> None:
 
 
 @compiled
+@pytest.mark.parametrize("unit_mm", [1e-3, 0.7, 10.0, 25.4, 1e4])
+@pytest.mark.parametrize("end", [0, 1])
+def test_home_on_the_ends_of_all_ranges_is_within_those_of_the_files(
+    unit_mm: float, end: int, tmp_path: Path
+) -> None:
+    """The first command of the README goes home, where LinuxCNC allows no rounding."""
+    home = OPTIMAL.home_pose
+    joints = inverse(OPTIMAL, home.position, home.rotation).tolist()
+    lengths = {
+        name: (joints[index], 2.0 * joints[index]) if end == 0 else (0.0, joints[index])
+        for index, name in enumerate(JOINTS)
+        if name in LENGTHS
+    }
+    guide = (joints[1], 2.0 * joints[3]) if end == 0 else (0.0, joints[3])
+    box = (home.position, (20.0, 22.0, 18.0)) if end == 0 else ((0.0, -12.0, 0.0), home.position)
+    limited = OPTIMAL.with_limits(**lengths, guide=guide, box=box)
+    design = msgspec.structs.replace(limited, unit_mm=unit_mm)
+    files = {file: data.decode() for file, data in linuxcnc_files(design).items()}
+    ini = configparser.ConfigParser(interpolation=None)
+    ini.read_string(files["flagged44.ini"])
+    (line,) = (line for line in files["README.txt"].splitlines() if "G90 G1" in line)
+    words = line.split()
+    assert [word[0] for word in words[2:]] == [*"XYZABCF"]
+    assert "e" not in line.lower()
+    world = np.array([float(word[1:]) for word in words[2:8]])
+    assert world.tolist() == [*map(float, ini["TRAJ"]["HOME"].split())]
+    assert_allclose(world, world_of(unit_mm * np.array(home.position), home.rotation), rtol=1e-12)
+    there, results = Component(design, tmp_path).inverse(world[None])
+    assert results == 0
+    places = {f"AXIS_{axis}": value for axis, value in zip("XYZABC", world, strict=True)}
+    places |= {f"JOINT_{index}": value for index, value in enumerate(there[0])}
+    for section, value in places.items():
+        low, high = (float(ini[section][key]) for key in ("MIN_LIMIT", "MAX_LIMIT"))
+        assert low <= value <= high, section
+        assert float(ini[section]["MAX_VELOCITY"]) > 0.0
+        if section.startswith("JOINT"):
+            assert low <= float(ini[section]["HOME"]) <= high
+            assert float(ini[section]["HOME"]) == pytest.approx(value, rel=1e-12)
+
+
+def test_range_of_zero_alone_holds_zero() -> None:
+    home = Pose((0.0, 5.0, 4.0), OPTIMAL.home_pose.quaternion)
+    flat = OPTIMAL.with_limits(box=((0.0, -12.0, 0.0), (0.0, 22.0, 18.0)))
+    files = linuxcnc_files(msgspec.structs.replace(flat, home=home))
+    ini = configparser.ConfigParser(interpolation=None)
+    ini.read_string(files["flagged44.ini"].decode())
+    low, high = (float(ini["AXIS_X"][key]) for key in ("MIN_LIMIT", "MAX_LIMIT"))
+    assert -1e-8 < low < 0.0 < high < 1e-8
+
+
+@compiled
 @pytest.mark.parametrize("name", DESIGNS)
 def test_component_equals_python(name: str, tmp_path: Path) -> None:
     component, kernel = Component(DESIGNS[name], tmp_path), CompiledKernel(DESIGNS[name], tmp_path)
