@@ -1,4 +1,4 @@
-"""The page where something is missing: the explorer's answers, or a fast network."""
+"""The page where something is missing: the explorer's answers, WebGL, or a fast network."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from collections.abc import Generator
 from contextlib import closing, contextmanager
 from typing import Any
 
+import pytest
+from likeness import decoded, likeness
 from playwright.sync_api import Browser, Locator, expect
 from tab import Tab
 
+from explorer.app.browser.headless import CHROMIUM_FLAGS, find_chromium
 from explorer.app.server import Running
+from explorer.app.state.actions import SetPosition
 
 ADVANCE = "milliseconds => window.explorer.clock.advance(milliseconds)"
 # Lets time pass, and waits for what comes from the explorer after that.
@@ -35,6 +39,18 @@ WATCH = """(() => {
 # Bytes of viser's page that came over the network.
 TRANSFERRED = """performance.getEntriesByType("resource")
     .find(({ name }) => name.includes("viser.html")).transferSize"""
+
+
+# What makes a Chromium one without WebGL, and what its console says of that.
+WITHOUT_WEBGL = ("--disable-gpu", "--disable-3d-apis")
+OF_WEBGL = re.compile(r"WebGL|not support|EXT_")
+# Takes WebGL from the scene, and gives it back.
+LOSE = """() => {
+    const scene = document.querySelector("canvas[data-engine]").getContext("webgl2");
+    window.graphics = scene.getExtension("WEBGL_lose_context");
+    window.graphics.loseContext();
+}"""
+GIVE_BACK = "window.graphics.restoreContext()"
 
 
 @contextmanager
@@ -119,3 +135,45 @@ def test_page_that_does_not_come_is_told_on_the_start_screen(
         page.goto(running.url)
         told = page.get_by_role("status")
         expect(told).to_have_text(re.compile(r"The page does not start: .+\. Load it again\."))
+
+
+def test_page_without_webgl_lacks_the_scene_alone_and_says_what_to_switch_on(
+    browser: Browser, running: Running
+) -> None:
+    launch = browser.browser_type.launch
+    arguments = [*CHROMIUM_FLAGS, *WITHOUT_WEBGL]
+    with (
+        closing(launch(executable_path=find_chromium(), args=arguments)) as plain,
+        closing(Tab(plain, running)) as tab,
+    ):
+        told = tab.page.get_by_role("status").filter(has_text="The scene needs WebGL")
+        expect(told).to_contain_text("switch on graphics acceleration")
+        figures = tab.page.get_by_role("toolbar", name="Figures")
+        before = figures.inner_text()
+        z = tab.drag("z", 0.8)
+        tab.settle()
+        assert tab.state.pose.position[2] == pytest.approx(z, abs=0.5)
+        expect(figures).not_to_have_text(before, use_inner_text=True)
+        assert tab.export("Figure", "SVG 85 mm").suggested_filename == "paper-optimal-figure.svg"
+        # A picture is no empty file.
+        tab.open_dialog("Export")
+        tab.push("Export Picture as PNG 1920 × 1080")
+        refused = tab.page.get_by_role("alert").filter(has_text="The browser draws no scene")
+        expect(refused).to_be_visible()
+        assert [each for each in tab.complaints() if not OF_WEBGL.search(each)] == []
+
+
+@pytest.mark.draws
+def test_scene_is_whole_again_once_the_browser_has_its_graphics_back(tab: Tab) -> None:
+    told = tab.page.get_by_role("status").filter(has_text="The browser has lost its graphics")
+    session, before = tab.running.page.session, decoded(tab.picture())
+    for _ in range(2):
+        tab.page.evaluate(LOSE)
+        expect(told).to_be_visible()
+        # What changes meanwhile is drawn too.
+        for x in (4.0, 10.0):
+            session.do(SetPosition(0, x))
+            session.wait_until_idle()
+        tab.page.evaluate(GIVE_BACK)
+        expect(told).to_have_count(0)
+        assert likeness(before, decoded(tab.picture())).spot < 2.0

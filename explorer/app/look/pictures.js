@@ -23,7 +23,8 @@ window.explorer.hold ??= () => {
 // Waits for a number of frames to be drawn, and until the browser has taken the last of them.
 window.explorer.awaitFrames ??= (count) =>
   new Promise((resolve) => {
-    const { render } = window.__viserTestpoints.rendererInfo;
+    // A renderer whose context was lost counts anew.
+    const { render } = window.__viserMutable.scene.__r3f.root.getState().gl.info;
     const last = render.frame + count;
     const next = () => {
       if (render.frame < last) {

@@ -238,4 +238,10 @@ def _draw(client: viser.ClientHandle, width: int, height: int) -> NDArray[np.uin
         raise NoAnswerError(
             f"the browser could not draw {width} × {height} pixels; take a smaller size"
         )
+    # The labels and the axes are in every picture.
+    if not pixels[..., 3].any():
+        raise NoAnswerError(
+            "the browser draws no scene: switch on graphics acceleration in its settings and load "
+            "the page again, or take the figure as SVG"
+        )
     return pixels
