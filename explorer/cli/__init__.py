@@ -28,7 +28,7 @@ COMMANDS: Mapping[str, str] = {
     "budget": "Rank what tolerances cost in precision; find those of a wanted precision.",
     "interference": "Measure the clearances of the legs, in a pose or over a move.",
     "path": "Plan a path between two poses within limits, margins and clearances.",
-    "drives": "Compute speeds, forces and powers of the actuators along a path; the least motor.",
+    "drives": "Compute speeds, forces and powers of the actuators along a path; one motor for all.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
     "orientation": "Measure the orientations of a position: share of all, greatest tilts, torsion.",
     "reproduce": "Measure the claims of the paper again, and judge each.",

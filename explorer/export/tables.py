@@ -35,9 +35,10 @@ def drives_csv(drives: Drives, trajectory: Trajectory) -> str:
     speeds in mm/s, forces in N and powers in W, as the header says.
     """
     head, columns = _columns(trajectory, 1.0)
+    rows = drives.at(trajectory.time)
     for name, unit in (("speed", "mm/s"), ("force", "N"), ("power", "W")):
         head += [f"{joint} {name} [{unit}]" for joint in JOINTS]
-        columns += [np.interp(trajectory.time, drives.time, v) for v in getattr(drives, name).T]
+        columns.append(getattr(rows, name))
     return _csv(head, np.column_stack(columns).tolist())
 
 

@@ -33,8 +33,9 @@ DEFAULT_TOLERANCE = 1e-6
 SMALLEST_TOLERANCE = 1e-9
 # Approximate number of poses of a move that the kernel evaluates, on which compiling depends.
 POSES_OF_MOVE = 64
-# A move has no length if no platform point goes farther than this share of the reach.
-NO_LENGTH = 1e-12
+# Length of a move, over the reach, up to which it has no clearances; and that up to which it is
+# rounding of its ends in a table and takes no time.
+NO_LENGTH, ROUNDED = 1e-12, 1e-6
 
 Ends: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """b4 (n, 3) and the rotation (n, 3, 3) at the start of n moves, then those at the end."""
@@ -142,11 +143,14 @@ class StraightMoves:
         p, r = np.array([e.position for e in poses]), np.array([e.rotation for e in poses])
         return StraightMoves.between(p[:-1], r[:-1], p[1:], r[1:], tool)
 
-    @property
-    def have_length(self) -> BoolArray:
-        """Whether each move is longer than rounding, shape (n,)."""
-        goes = arrays.lengths_of(self.step) > NO_LENGTH * np.abs(self.start).max(initial=0.0)
-        return goes | (arrays.lengths_of(self.turn) > NO_LENGTH)
+    def lengths(self, reach: float, number: IntArray | slice = slice(None)) -> FloatArray:
+        """Return the lengths of moves by number: steps, and turns times the reach, shape (...)."""
+        steps, turns = (arrays.lengths_of(each[number]) for each in (self.step, self.turn))
+        return steps + reach * turns
+
+    def have_length(self, reach: float) -> BoolArray:
+        """Return which moves are longer than the rounding of a table of poses, shape (n,)."""
+        return self.lengths(reach) > ROUNDED * reach
 
     def poses(self, number: IntArray, share: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return b4 (..., 3) and rotations (..., 3, 3) at shares, 0 to 1, of moves by number."""
@@ -273,8 +277,7 @@ def move_clearance(
     if steps < 1:
         raise InputError(f"a move has at least one step; got {steps}")
     way = StraightMoves.along((start, end), tool)
-    length = np.linalg.norm(way.step) + design.reach * np.linalg.norm(way.turn)
-    if length <= NO_LENGTH * max(design.reach, *map(abs, start.position)):
+    if way.lengths(design.reach)[0] <= NO_LENGTH * max(design.reach, *map(abs, start.position)):
         place = ", ".join(f"{x:g}" for x in start.position)
         raise InputError(
             f"a move needs two poses that differ; both have the position ({place}) and the "

@@ -1,9 +1,9 @@
-"""Drives: what a path asks of the six actuators in time, and the least motor that holds it.
+"""Drives: what a path with a time law asks of the six actuators, and of one motor for all.
 
 Speeds, accelerations and forces are those of a time law, at the start, the middle and the end of
-each interval of its grid: between two intervals the acceleration jumps. A force is that of the
-joint, so gears, screws and the inertia of rotors are left out. Mean power is the mean of its size,
-because most drives turn the power of a brake into heat.
+each of its intervals: between two intervals the acceleration jumps. A force is that of the joint,
+so gears, screws and the inertia of rotors are left out. Mean power is the mean of its size, because
+most drives turn the power of a brake into heat.
 """
 
 from __future__ import annotations
@@ -23,15 +23,11 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.time_law import (
-    SINGULAR,
-    JointMotion,
-    TimeLaw,
-    law_at_speed,
-    law_of_shortest_time,
-)
+from explorer.paths.shortest_time import SINGULAR, law_of_shortest_time
+from explorer.paths.time_law import Motion, TimeLaw, law_at_speed
 from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies
-from explorer.statics.weights import MovingBodies
+from explorer.statics.forces import forces_of
+from explorer.statics.weights import MovingBodies, carry
 from explorer.workspace.limits.valid_moves import LARGEST_TURN, moves_are_valid
 from explorer.workspace.limits.valid_poses import violations
 
@@ -39,8 +35,10 @@ from explorer.workspace.limits.valid_poses import violations
 BEYOND = 1.0 + 1e-6
 # Share of a limit from which it binds.
 BINDING = 1.0 - 1e-3
-# Parts of an interval, and their weights in its mean by Simpson's rule. The end stays within it.
-PARTS, WEIGHTS = (0.0, 0.5, 1.0 - 1e-9), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+# Intervals whose motion is computed at once; a path of many moves needs much memory otherwise.
+AT_ONCE = 20_000
+# Parts of an interval, and their weights in its mean by Simpson's rule.
+PARTS, WEIGHTS = (0.0, 0.5, 1.0), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 
 class TimedPath(NamedTuple):
@@ -48,8 +46,9 @@ class TimedPath(NamedTuple):
 
     Attributes:
         poses: Corners of the path, two or more.
-        duration: Duration in seconds, with the least acceleration of the fastest actuator; None for
-            the shortest time within the limits of the actuators, which needs the extra `timing`.
+        duration: Duration in seconds, in which the fastest actuator accelerates over one half of
+            each move and brakes over the other, always by the same; None for the shortest time
+            within the limits of the actuators, which needs the extra `timing`.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
         density: Density of legs and platform in kg/m³, as bars with the legs' radii.
         law: Time law of the path, in place of a duration.
@@ -94,45 +93,83 @@ class Summary(NamedTuple):
     mean_power: FloatArray
 
 
-@dataclass(frozen=True)
-class Drives:
-    """Speeds, accelerations and forces of the six actuators along a path in time.
+@dataclass(frozen=True, eq=False)
+class ActuatorMotion:
+    """Speeds, accelerations and forces of the six actuators at some times.
 
     Attributes:
-        design: The manipulator.
-        law: Time law of the path.
-        time: Times in seconds, three for each interval of the law, shape (n,).
+        time: Times in seconds, shape (n,).
         speed: Speeds of the joints in mm/s, shape (n, 6).
         acceleration: Their accelerations in mm/s², shape (n, 6).
         force: Forces of the actuators in N, shape (n, 6); f > 0 pushes the joint's value up.
     """
 
-    design: Design
-    law: TimeLaw
     time: FloatArray
     speed: FloatArray
     acceleration: FloatArray
     force: FloatArray
 
     @staticmethod
-    def along(design: Design, moves: StraightMoves, law: TimeLaw, bodies: MovingBodies) -> Drives:
-        """Return what moves with a time law ask of the actuators, given the masses that move.
+    def of(design: Design, law: TimeLaw, motion: Motion, bodies: MovingBodies) -> ActuatorMotion:
+        """Return what a motion with a law asks of the actuators, given the masses that move.
 
         Raises:
             NoAnswerError: The path is singular.
         """
-        time, number, share, rate, change = law.within_intervals(PARTS)
-        motion = JointMotion.along(design, moves, number, share, bodies)
-        u, x = change[:, None], rate[:, None] ** 2
-        speed = design.unit_mm * rate[:, None] * motion.slope
-        acceleration = design.unit_mm * (u * motion.slope + x * motion.curvature)
-        force = motion.at_rest + u * motion.by_u + x * motion.by_x
-        return Drives(design, law, time, speed, acceleration, force)
+        moves = law.travel.moves
+        c = Configuration(design, *moves.poses(motion.number, motion.share))
+        twist, bend = moves.slopes(motion.number, c.rotation)
+        rate, change = motion.rate[:, None], motion.change[:, None]
+        acceleration = change * twist + rate**2 * bend
+        force = forces_of(c, carry(c, bodies, rate * twist, acceleration).wrench)
+        if not np.isfinite(force).all():
+            raise NoAnswerError(SINGULAR)
+        return ActuatorMotion(
+            motion.time,
+            design.unit_mm * rate * motion.slope,
+            design.unit_mm * (change * motion.slope + rate**2 * motion.curvature),
+            force,
+        )
 
     @property
     def power(self) -> FloatArray:
         """Mechanical powers of the actuators in W, below zero while they brake, shape (n, 6)."""
         return 1e-3 * self.force * self.speed
+
+
+@dataclass(frozen=True, eq=False)
+class Drives(ActuatorMotion):
+    """The motion of the actuators along a path, at three times in each interval of its law.
+
+    Attributes:
+        design: The manipulator.
+        law: Time law of the path.
+        bodies: The masses that move.
+    """
+
+    design: Design
+    law: TimeLaw
+    bodies: MovingBodies
+
+    @staticmethod
+    def along(design: Design, law: TimeLaw, bodies: MovingBodies) -> Drives:
+        """Return what a time law asks of the actuators; arguments and errors as in `of`."""
+        intervals = np.arange(len(law.speed))
+        found = [
+            ActuatorMotion.of(design, law, law.within_intervals(PARTS, index), bodies)
+            for index in np.array_split(intervals, 1 + len(intervals) // AT_ONCE)
+        ]
+        time, speed, acceleration, force = (
+            np.concatenate(each)
+            for each in zip(
+                *((m.time, m.speed, m.acceleration, m.force) for m in found), strict=True
+            )
+        )
+        return Drives(time, speed, acceleration, force, design, law, bodies)
+
+    def at(self, time: FloatArray) -> ActuatorMotion:
+        """Return the motion of the actuators at times (n,)."""
+        return self.of(self.design, self.law, self.law.at(time), self.bodies)
 
     @cached_property
     def summary(self) -> Summary:
@@ -148,14 +185,12 @@ class Drives:
 
     @property
     def least_motor(self) -> Mapping[str, float]:
-        """The least that one motor for all six has to hold: the largest of each in the summary."""
+        """The least motor for this law: the largest of the six actuators, in each number."""
         return {name: float(six.max()) for name, six in self.summary._asdict().items()}
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Return means over time of values at the times, of shape (n, ...)."""
-        intervals = np.diff(self.law.time)
-        weights = np.outer(intervals[intervals > 0.0], WEIGHTS).ravel()
-        return weights @ values / self.law.duration
+        return np.outer(self.law.steps, WEIGHTS).ravel() @ values / self.law.duration
 
     @cached_property
     def binding(self) -> tuple[tuple[Binding, ...], ...]:
@@ -200,10 +235,10 @@ def drives_along(design: Design, path: TimedPath) -> Drives:
             raise NoAnswerError(SINGULAR)
     bodies = moving_bodies(design, bar_masses(design, path.density))
     if law is None and path.duration is not None:
-        law = law_at_speed(design, moves).lasting(path.duration)
+        law = law_at_speed(design, moves, acceleration=1.0).lasting(path.duration)
     elif law is None:
         law = law_of_shortest_time(design, moves, bodies)
-    return Drives.along(design, moves, law, bodies)
+    return Drives.along(design, law, bodies)
 
 
 def check_limits(design: Design, moves: StraightMoves) -> None:
@@ -230,14 +265,15 @@ def check_limits(design: Design, moves: StraightMoves) -> None:
 
 
 def drive_blocks(drives: Drives) -> Iterator[block.Block]:
-    """Yield what a path asks of the actuators, and the least motor."""
+    """Yield what a path asks of the actuators, and of one motor for all six."""
     units = (" mm/s,", " N peak force,", " N continuous force (RMS) and", " W peak power.")
     speed, force, steady, power = map(block.Number, [*drives.least_motor.values()][:4], units)
     used = [*map(_binding_words, drives.binding)]
     yield block.Statement(
-        "Least motor",
+        "Least motor for this time law",
         ("One motor for all six needs at least ", speed, " ", force, " ", steady, " ", power),
-        hint="The largest of the six actuators, in each number",
+        hint="The largest of the six actuators, in each number; in the same time another law may "
+        "need less of one of them",
     )
     titles = "peak speed, mm/s", "peak force, N", "RMS force, N", "peak power, W", "mean power, W"
     yield block.Table(

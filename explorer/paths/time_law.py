@@ -1,71 +1,242 @@
 """Time laws: when the platform is where on a path of straight moves, from rest to rest.
 
 A law keeps the geometry of its path, so that it stops at every corner, which only infinite
-accelerations would pass. It has the rate of the share of a move at grid points, between which the
-second derivative of the share is constant.
-
-With x the squared rate and u the change of the rate, speeds bound x, and accelerations and forces
-bound sums a u + b x. These bounds hold at both ends of every interval between grid points, in which
-x changes by 2 u times its length. What holds the path at rest is assumed to be within the limits,
-so that x may be anything from zero to a greatest value, which toppra finds (Pham and Pham, "A New
-Approach to Time-Optimal Path Parameterization Based on Reachability Analysis", 2018). Last, the law
-is slowed down until it exceeds no limit on a grid ten times finer.
+accelerations would pass. So it is the sequence of its moves, whose times add up. A move consists of
+intervals, in each of which one leader has a constant acceleration: an actuator, or the platform,
+whose travel is in proportion to the share of the move. In the law at a speed the fastest actuator
+leads everywhere, and the speed of the leader over time is a trapezoid in closed form.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from types import SimpleNamespace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from explorer.errors import InputError, NoAnswerError
-from explorer.files.extras import load_extra
+from explorer.errors import InputError
 from explorer.legs.moves import StraightMoves
-from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.machine import or_infinite
-from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.statics.forces import forces_of
+from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import inverse
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.roots import find_roots
 from explorer.statics.motion import joint_accelerations, joint_rates
-from explorer.statics.weights import MovingBodies, carry
 
-# Points of the grid over the whole path, and the most moves of a path.
-POINTS, MOST_MOVES = 200, 10_000
-# Least intervals of a move, and steps of an interval after which limits are checked.
-LEAST_INTERVALS, STEPS = 16, 10
-SINGULAR = "the path is singular, so that no forces move the platform along it"
-# A squared rate that no path reaches, in the unit in which they are about one; toppra fails at 1e5.
-UNBOUNDED = 1e4
+MOST_MOVES = 10_000
+# Intervals of the grid of a move as long as the reach, and the fewest and the most of any move.
+INTERVALS, FEWEST_INTERVALS, MOST_INTERVALS = 200, 24, 1000
+# The platform as a leader, after the six joints, and its travel over a move, as a share of the
+# move's length. It leads where all actuators are nearly at rest, as in some singular poses.
+PLATFORM, PLATFORM_TRAVEL = 6, 1e-6
+# Share of its speed by which an actuator may be faster than the leader, and most rounds in which
+# intervals are divided where the leader changes.
+AS_FAST, ROUNDS = 1e-6, 10
+# Tolerance of roots over the way of the leader, and the way, over the value of its joint, below
+# which the tolerance is no smaller, because the value is rounded.
+ROOT_ERROR, SHORT_WAY = 1e-10, 1e-5
 
 
-@dataclass(frozen=True)
-class TimeLaw:
-    """The place on a path over time; between grid points its second derivative is constant.
+class Motion(NamedTuple):
+    """The motion along a path at some times.
 
     Attributes:
-        time: Time in seconds, from 0, shape (n,).
-        at: Place on the path: number of the move plus the share of it, shape (n,).
-        rate: Rate of the place, in 1/s, zero at every corner, shape (n,).
+        time: Times in seconds, shape (n,).
+        number: Number of the move, shape (n,).
+        share: Share of it, from 0 to 1, shape (n,).
+        rate: Rate of the share in 1/s, shape (n,).
+        change: Rate of this rate in 1/s², shape (n,).
+        slope, curvature: Derivatives of the joints by the share, in design units, (n, 6) each.
     """
 
     time: FloatArray
-    at: FloatArray
+    number: IntArray
+    share: FloatArray
     rate: FloatArray
+    change: FloatArray
+    slope: FloatArray
+    curvature: FloatArray
+
+
+class Intervals(NamedTuple):
+    """Intervals of moves with their leaders.
+
+    Attributes:
+        number: Number of the move, shape (n,).
+        leader: Index of the joint that leads, or `PLATFORM`, shape (n,).
+        share: Shares of the move at both ends, shape (n, 2).
+    """
+
+    number: IntArray
+    leader: IntArray
+    share: FloatArray
+
+    def select(self, index: IntArray | BoolArray) -> Intervals:
+        """Return the intervals at an index (k,), or where it is true."""
+        return Intervals(self.number[index], self.leader[index], self.share[index])
+
+
+class Travel(NamedTuple):
+    """The travel of the six joints and of the platform along straight moves, in design units."""
+
+    design: Design
+    moves: StraightMoves
+
+    def slopes(self, number: IntArray, share: FloatArray) -> FloatArray:
+        """Return the derivatives of these seven by the share of moves by number, (..., 7)."""
+        p, r = self.moves.poses(number, share)
+        rates = joint_rates(self.design, p, r, self.moves.slopes(number, r)[0])
+        return np.concatenate([rates, self.of_platform(number)[..., None]], axis=-1)
+
+    def curvatures(self, number: IntArray, share: FloatArray) -> FloatArray:
+        """Return the second derivatives of these seven by the share, shape (..., 7)."""
+        p, r = self.moves.poses(number, share)
+        changes = joint_accelerations(self.design, p, r, *self.moves.slopes(number, r))
+        return np.concatenate([changes, np.zeros((*share.shape, 1))], axis=-1)
+
+    def of_platform(self, number: IntArray) -> FloatArray:
+        """Return the travel of the platform over moves by number (...), of the same shape."""
+        return PLATFORM_TRAVEL * self.moves.lengths(self.design.reach, number)
+
+    def ways(self, intervals: Intervals) -> FloatArray:
+        """Return how far the leader goes in each interval, shape (n,)."""
+        start, end = (self._led(intervals, at) for at in intervals.share.T)
+        return np.abs(end - start)
+
+    def shares_after(self, intervals: Intervals, part: FloatArray) -> FloatArray:
+        """Return the shares at which leaders have gone a part, 0 to 1, of their ways, (n,)."""
+        first, last = intervals.share[:, 0], intervals.share[:, 1]
+        start, whole = self._led(intervals, first), self.ways(intervals)
+        scale = np.maximum(whole, SHORT_WAY * np.abs(start))
+
+        def beyond(at: FloatArray) -> FloatArray:
+            gone = np.abs(self._led(intervals, first + at * (last - first)) - start)
+            return (gone - part * whole) / scale
+
+        at = find_roots(beyond, -part * whole / scale, (1.0 - part) * whole / scale, ROOT_ERROR)
+        return np.where(part < 1.0, first + at * (last - first), last)
+
+    def _led(self, intervals: Intervals, share: FloatArray) -> FloatArray:
+        """Return the travel of the leaders at shares of their moves, shape (n,)."""
+        number, leader, _ = intervals
+        joints = inverse(self.design, *self.moves.poses(number, share))
+        travel = np.concatenate([joints, (self.of_platform(number) * share)[:, None]], axis=1)
+        return _pick(travel, leader)
+
+    def grid(self, fewest: int) -> tuple[IntArray, FloatArray]:
+        """Return number and share of grid points of all moves with a length, shape (n,) each.
+
+        They are denser towards both ends of a move, which a motion from rest to rest passes slowly.
+        Every move has at least the fewest intervals that are given.
+
+        Raises:
+            InputError: No move has a length, or there are too many.
+        """
+        lengths, reach = self.moves.lengths(self.design.reach), self.design.reach
+        moving = np.flatnonzero(self.moves.have_length(reach))
+        if not len(moving):
+            raise InputError("the path has no length: it needs two poses that differ")
+        if len(lengths) > MOST_MOVES:
+            raise InputError(
+                f"a path has at most {MOST_MOVES} moves; got {len(lengths)}: leave corners out"
+            )
+        intervals = np.ceil(INTERVALS * lengths[moving] / reach)
+        counts = np.clip(intervals, fewest, MOST_INTERVALS).astype(np.int64)
+        even = [np.linspace(0.0, 1.0, count + 1, dtype=np.float64) for count in counts]
+        return np.repeat(moving, counts + 1), np.sin(0.5 * math.pi * np.concatenate(even)) ** 2
+
+    def intervals(self) -> Intervals:
+        """Return intervals of all moves whose leaders are the fastest of the seven all along.
+
+        Errors are those of `grid`.
+        """
+        number, share = self.grid(FEWEST_INTERVALS)
+        found = self._between(number, share)
+        for _ in range(ROUNDS):
+            changes, at = self._changes_of_leader(found)
+            if not len(at):
+                break
+            number, share = np.append(number, changes), np.append(share, at)
+            order = np.lexsort((share, number))
+            number, share = number[order], share[order]
+            found = self._between(number, share)
+        found = found._replace(leader=found.leader % (PLATFORM + 1))
+        return found.select(self.ways(found) > 0.0)
+
+    def _between(self, number: IntArray, share: FloatArray) -> Intervals:
+        """Return the intervals between grid points, led by the fastest in the middle of each."""
+        starts = np.flatnonzero(number[1:] == number[:-1])
+        ends, number = share[np.stack([starts, starts + 1], axis=1)], number[starts]
+        leader: IntArray = self._speeds(number, ends.mean(axis=1)).argmax(axis=1)
+        return Intervals(number, leader, ends)
+
+    def _changes_of_leader(self, intervals: Intervals) -> tuple[IntArray, FloatArray]:
+        """Return moves and shares where another one becomes as fast as the leader, (k,) each."""
+        number, leader = (np.repeat(each[:, None], 2, axis=1) for each in intervals[:2])
+        speeds = self._speeds(number, intervals.share)
+        row, end = np.nonzero((1.0 + AS_FAST) * _pick(speeds, leader) < speeds.max(axis=2))
+        before, after, of = leader[row, end], speeds.argmax(axis=2)[row, end], number[row, end]
+        middle = intervals.share[row].mean(axis=1)
+        span = intervals.share[row, end] - middle
+
+        def lead(at: FloatArray) -> FloatArray:
+            speeds = self._speeds(of, middle + at * span)
+            return (_pick(speeds, after) - _pick(speeds, before)) / speeds.max(axis=1)
+
+        ends = lead(np.zeros(len(of))), lead(np.ones(len(of)))
+        return of, middle + span * find_roots(lead, *ends, ROOT_ERROR)
+
+    def _speeds(self, number: IntArray, share: FloatArray) -> FloatArray:
+        """Return the slopes and then those of the joints in the other sense, shape (..., 13)."""
+        slopes = self.slopes(number, share)
+        return np.concatenate([slopes, -slopes[..., :PLATFORM]], axis=-1)
+
+
+def _pick(values: FloatArray, index: IntArray) -> FloatArray:
+    """Return values (..., k) by index, shape (...)."""
+    return np.take_along_axis(values, index[..., None], axis=-1)[..., 0]
+
+
+@dataclass(frozen=True, eq=False)
+class TimeLaw:
+    """The moves of a path in time, one after the other, as intervals with their leaders.
+
+    Attributes:
+        travel: The moves of the path, and what may lead along them.
+        intervals: The n intervals, by ascending time. A move without a length has none, and takes
+            no time.
+        speed: Speeds of the leader at both ends, in design units per second, shape (n, 2).
+        acceleration: Acceleration of the leader, below zero while it brakes, shape (n,).
+    """
+
+    travel: Travel
+    intervals: Intervals
+    speed: FloatArray
+    acceleration: FloatArray
 
     @staticmethod
-    def of(rates: FloatArray) -> TimeLaw:
-        """Return the law with some rates at evenly spaced shares of moves, shape (moves, n)."""
-        count, points = rates.shape
-        rate = np.append(rates[:, :-1], 0.0)
-        at = np.linspace(0.0, count, len(rate), dtype=np.float64)
-        sums, steps = rate[1:] + rate[:-1], np.full(len(rate) - 1, 2.0 / (points - 1))
-        # A move without a length takes no time.
-        steps = np.divide(steps, sums, out=np.zeros(len(steps)), where=sums > 0.0)
-        return TimeLaw(np.append(0.0, np.cumsum(steps)), at, rate)
+    def sequence(laws: Sequence[TimeLaw]) -> TimeLaw:
+        """Return laws of moves of one path, one after the other."""
+        number, leader, share = map(
+            np.concatenate, zip(*(law.intervals for law in laws), strict=True)
+        )
+        speed, acceleration = (
+            np.concatenate(each)
+            for each in zip(*((law.speed, law.acceleration) for law in laws), strict=True)
+        )
+        return TimeLaw(laws[0].travel, Intervals(number, leader, share), speed, acceleration)
+
+    @cached_property
+    def steps(self) -> FloatArray:
+        """Times that the intervals take in seconds, shape (n,)."""
+        return 2.0 * self.travel.ways(self.intervals) / self.speed.sum(axis=1)
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """Times of the ends of the intervals in seconds, from 0, shape (n + 1,)."""
+        return np.append(0.0, np.cumsum(self.steps))
 
     @property
     def duration(self) -> float:
@@ -80,211 +251,85 @@ class TimeLaw:
         """
         if not 0.0 < duration < math.inf:
             raise InputError(f"the duration must be above zero; got {duration:g} s")
-        slower = duration / self.duration
-        return TimeLaw(slower * self.time, self.at, self.rate / slower)
+        times = duration / self.duration
+        return replace(self, speed=self.speed / times, acceleration=self.acceleration / times**2)
 
-    def places(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return place, its rate and its second derivative at times (n,), each of shape (n,)."""
-        index = np.clip(np.searchsorted(self.time, time, "right") - 1, 0, len(self.time) - 2)
-        since, rate = time - self.time[index], self.rate[index]
-        change = np.diff(self.rate**2) / (2.0 * np.diff(self.at))
-        at = self.at[index] + rate * since + 0.5 * change[index] * since**2
-        ends = self.at[index], self.at[index + 1]
-        return np.clip(at, *ends), rate + change[index] * since, change[index]
+    def at(self, time: FloatArray) -> Motion:
+        """Return the motion at times (n,); at a corner, that with which the next move starts."""
+        index = np.clip(np.searchsorted(self.time, time, "right") - 1, 0, len(self.speed) - 1)
+        part = np.clip((time - self.time[index]) / self.steps[index], 0.0, 1.0)
+        return self._motion(index, part)
 
-    def within_intervals(
-        self, parts: Sequence[float]
-    ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
-        """Return times, moves, shares of them, their rates and second derivatives, (n,) each.
+    def within_intervals(self, parts: Sequence[float], index: IntArray | None = None) -> Motion:
+        """Return the motion after parts, from 0 to 1, of the time of intervals, all in turn.
 
-        They are those after some parts, from 0 to below 1, of each interval that takes time.
+        At the ends of an interval, where accelerations jump, it is the motion within it. An index
+        chooses intervals, None all.
         """
-        steps = np.diff(self.time)[:, None]
-        time = (self.time[:-1, None] + steps * np.array(parts))[steps[:, 0] > 0.0].ravel()
-        at, rate, change = self.places(time)
-        # To rounding the end of an interval may be in the next move.
-        middles = 0.5 * (self.at[:-1] + self.at[1:])[steps[:, 0] > 0.0]
-        number = np.repeat(middles.astype(np.int64), len(parts))
-        return time, number, at - number, rate, change
+        index = np.arange(len(self.speed)) if index is None else index
+        return self._motion(np.repeat(index, len(parts)), np.tile(np.array(parts), len(index)))
 
-
-class JointMotion(NamedTuple):
-    """Motions of the joints and forces of the actuators at places of a path, (..., 6) each.
-
-    With x the squared rate of the share of a move and u the change of the rate, the speeds are
-    slope √x, the accelerations slope u + curvature x, and the forces at_rest + by_u u + by_x x, in
-    design units, seconds and newtons.
-    """
-
-    slope: FloatArray
-    curvature: FloatArray
-    at_rest: FloatArray
-    by_u: FloatArray
-    by_x: FloatArray
-
-    @staticmethod
-    def along(
-        design: Design,
-        moves: StraightMoves,
-        number: IntArray,
-        share: FloatArray,
-        bodies: MovingBodies,
-    ) -> JointMotion:
-        """Return the motions and forces at shares of moves by number, shape (...) each."""
-        c = Configuration(design, *moves.poses(number, share))
-        place, rest = (design, c.position, c.rotation), np.zeros(6)
-        twist, change = moves.slopes(number, c.rotation)
-        at_rest, with_u, with_x = (
-            forces_of(c, carry(c, bodies, *motion).wrench)
-            for motion in ((rest, rest), (rest, twist), (twist, change))
+    def _motion(self, index: IntArray, part: FloatArray) -> Motion:
+        """Return the motion after parts of the time of intervals by index, shape (n,) each."""
+        time = self.time[index] + part * self.steps[index]
+        led, (start, end) = self.intervals.select(index), self.speed[index].T
+        speed = start + part * (end - start)
+        share = self.travel.shares_after(led, part * (start + speed) / (start + end))
+        slopes, curvatures = (
+            each(led.number, share) for each in (self.travel.slopes, self.travel.curvatures)
         )
-        if not np.isfinite(at_rest).all():
-            raise NoAnswerError(SINGULAR)
-        return JointMotion(
-            joint_rates(*place, twist),
-            joint_accelerations(*place, twist, change),
-            at_rest,
-            with_u - at_rest,
-            with_x - at_rest,
-        )
-
-
-class Bounds(NamedTuple):
-    """What the limits of the actuators demand at places of a path: a u + b x ≤ most, x ≤ square.
-
-    Attributes:
-        a, b, most: Bounds of accelerations and forces to either side, shape (..., 24) each.
-        square: Largest x by the speeds, shape (...).
-    """
-
-    a: FloatArray
-    b: FloatArray
-    most: FloatArray
-    square: FloatArray
-
-    @staticmethod
-    def of(design: Design, motion: JointMotion) -> Bounds:
-        """Return the bounds by the limits of a design."""
-        limits, (slope, curvature, at_rest, by_u, by_x) = design.actuators, motion
-        speed = or_infinite(limits.speed_mm_s) / design.unit_mm
-        acceleration = or_infinite(limits.acceleration_mm_s2) / design.unit_mm
-        push, pull = limits.limits
-        share = np.maximum(at_rest / push, -at_rest / pull)
-        if share.max(initial=0.0) >= 1.0:
-            place = np.unravel_index(share.argmax(), share.shape)
-            force = abs(at_rest[place])
-            raise NoAnswerError(
-                f"the platform cannot rest everywhere on the path: at rest the actuator of "
-                f"{JOINTS[int(place[-1])]} needs {force:.4g} N, and its limit is "
-                f"{force / share[place]:.4g} N"
-            )
-        even = np.broadcast_to(acceleration, slope.shape)
-        most = np.concatenate([even, push - at_rest, even, pull + at_rest], axis=-1)
-        a, b = (np.concatenate(each, axis=-1) for each in ((slope, by_u), (curvature, by_x)))
-        fastest = np.divide(
-            speed, np.abs(slope), out=np.full(slope.shape, np.inf), where=slope != 0
-        )
-        a, b = (np.concatenate([each, -each], axis=-1) for each in (a, b))
-        return Bounds(a, b, most, fastest.min(axis=-1) ** 2)
+        slope, curvature = (_pick(each, led.leader) for each in (slopes, curvatures))
+        rate = speed / np.abs(slope)
+        change = (self.acceleration[index] - np.sign(slope) * curvature * rate**2) / np.abs(slope)
+        joints = slopes[:, :PLATFORM], curvatures[:, :PLATFORM]
+        return Motion(time, led.number, share, rate, change, *joints)
 
 
 def law_at_speed(
-    design: Design, moves: StraightMoves, speed: float = math.inf, acceleration: float = 1.0
+    design: Design,
+    moves: StraightMoves,
+    speed: float = math.inf,
+    acceleration: float = math.inf,
 ) -> TimeLaw:
-    """Return the law by which the travel of the fastest actuator over each move is a trapezoid.
+    """Return the law in which the speed of the fastest actuator is a trapezoid over each move.
 
-    It reaches the speed with the acceleration and stops with it, in design units and seconds. With
-    no largest speed it brakes from the middle of its travel on.
+    It reaches the speed with the acceleration and brakes with the same, in design units and
+    seconds. Without a speed it brakes from the middle of its travel on, without an acceleration it
+    has the speed all along, also at corners.
 
     Raises:
-        InputError: The path has no length, or speed or acceleration is not above zero.
+        InputError: The path has no length or too many moves; speed or acceleration is not above
+            zero, or neither is finite.
     """
-    if not (speed > 0.0 and 0.0 < acceleration < math.inf):
+    if not (speed > 0.0 and acceleration > 0.0 and min(speed, acceleration) < math.inf):
         raise InputError(
             f"speed and acceleration must be above zero; got {speed:g} and {acceleration:g}"
         )
-    number, share = _grid(moves)
-    p, r = moves.poses(number, share)
-    slopes = np.abs(joint_rates(design, p, r, moves.slopes(number, r)[0])).max(axis=-1)
-    travel = np.zeros_like(slopes)
-    travel[:, 1:] = np.cumsum(slopes[:, 1:] + slopes[:, :-1], axis=1) / (2.0 * (len(share[0]) - 1))
-    rest = 2.0 * acceleration * np.minimum(travel, travel[:, -1:] - travel)
-    speeds = np.sqrt(np.clip(rest, 0.0, speed**2))
-    return TimeLaw.of(np.divide(speeds, slopes, out=np.zeros_like(slopes), where=slopes > 0.0))
-
-
-def law_of_shortest_time(design: Design, moves: StraightMoves, bodies: MovingBodies) -> TimeLaw:
-    """Return the law of the shortest time within speeds, accelerations and forces of the actuators.
-
-    Needs the extra `timing`. The forces hold and accelerate bodies.
-
-    Raises:
-        InputError: The path has no length, or no limit bounds the acceleration.
-        MissingExtraError: toppra is not installed.
-        NoAnswerError: A weight exceeds the largest force of an actuator at rest, or the path is
-            singular.
-    """
-    number, share = _grid(moves)
-    bounds = Bounds.of(design, JointMotion.along(design, moves, number, share, bodies))
-    sides = np.sign(bounds.a) * np.isfinite(bounds.most)
-    if not ((sides.max(axis=-1) > 0.0) & (sides.min(axis=-1) < 0.0))[moves.have_length].all():
-        raise InputError(
-            "nothing limits the acceleration along the path: give the design a limit such as "
-            "actuators.acceleration_mm_s2, or actuators.push_n and masses to move; or choose a "
-            "duration"
-        )
-    squares = np.zeros(share.shape)
-    for move in np.flatnonzero(moves.have_length):
-        squares[move] = _greatest_squares(Bounds(*(each[move] for each in bounds)))
-    law = TimeLaw.of(np.sqrt(squares))
-    # Between grid points a limit may be exceeded by a little.
-    _, number, share, rate, change = law.within_intervals([i / STEPS for i in range(STEPS)])
-    finer = Bounds.of(design, JointMotion.along(design, moves, number, share, bodies))
-    asked = (finer.a * change[:, None] + finer.b * rate[:, None] ** 2) / finer.most
-    excess = max(1.0, asked.max(), (rate**2 / finer.square).max())
-    return law.lasting(law.duration * math.sqrt(excess))
-
-
-def _grid(moves: StraightMoves) -> tuple[IntArray, FloatArray]:
-    """Return number and share of grid points of moves, shape (moves, n) each."""
-    count = len(moves.step)
-    if not moves.have_length.any():
-        raise InputError("the path has no length: it needs two poses that differ")
-    if count > MOST_MOVES:
-        raise InputError(f"a path has at most {MOST_MOVES} moves; got {count}: leave corners out")
-    intervals = max(LEAST_INTERVALS, math.ceil(POINTS / count))
-    share = np.linspace(0.0, 1.0, intervals + 1, dtype=np.float64)
-    return np.repeat(np.arange(count)[:, None], len(share), axis=1), np.tile(share, (count, 1))
-
-
-def _greatest_squares(bounds: Bounds) -> FloatArray:
-    """Return the greatest squared rates at evenly spaced shares of a move, shape (n,).
-
-    They start and end at zero.
-    """
-    algorithm, constraint = load_extra("timing", "toppra.algorithm", "toppra.constraint")
-    shares = np.linspace(0.0, 1.0, len(bounds.square), dtype=np.float64)
-    is_bounded = np.isfinite(bounds.most).all(axis=0)
-    a, b, most = (each[:, is_bounded] for each in (bounds.a, bounds.b, bounds.most))
-    # The tolerances of toppra are absolute, so it gets squared rates of about one.
-    start = np.divide(most, np.abs(a), out=np.full(a.shape, np.inf), where=a != 0.0).min(axis=1)
-    unit = float(np.median(np.minimum(start, bounds.square)))
-    rows, ones = (unit * a / most, unit * b / most, np.zeros(a.shape)), np.ones(a.shape[1])
-    square = np.minimum(bounds.square / unit, UNBOUNDED)
-    span = np.stack([np.zeros(len(shares)), square], axis=1)
-    # Each bound holds at both ends of every interval.
-    at_both_ends = constraint.canlinear_colloc_to_interpolate(
-        *rows, np.diag(ones), ones, None, None, shares, identical=True
-    )
-
-    def numbers_of(*_: object) -> tuple[object, ...]:
-        return (*at_both_ends[:5], None, span)
-
-    limits, path = constraint.LinearConstraint(), SimpleNamespace(path_interval=(0.0, 1.0))
-    limits.identical, limits.compute_constraint_params = True, numbers_of
-    search = algorithm.TOPPRA([limits], path, gridpoints=shares, solver_wrapper="seidel")
-    search.compute_parameterization(0.0, 0.0)
-    rates = search.problem_data.sd_vec
-    if rates is None or not np.isfinite(rates).all():
-        raise NoAnswerError("toppra finds no law of the shortest time along the path")
-    return unit * rates**2
+    travel = Travel(design, moves)
+    led = travel.intervals()
+    # Travel since the start of the path: at the ends of intervals, of moves, and of ramps.
+    ways = travel.ways(led)
+    gone = np.append(0.0, np.cumsum(ways))
+    starts = np.flatnonzero(np.diff(led.number, prepend=-1))
+    begin, end = gone[starts], gone[np.append(starts[1:], len(led.number))]
+    ramp = np.minimum(0.5 * speed**2 / acceleration, 0.5 * (end - begin))
+    cuts = np.stack([begin + ramp, end - ramp], axis=1).ravel()
+    index = np.clip(np.searchsorted(gone, cuts, "right") - 1, 0, len(led.number) - 1)
+    part = np.clip((cuts - gone[index]) / ways[index], 0.0, 1.0)
+    at = travel.shares_after(led.select(index), part)
+    # Divide the intervals in which a ramp ends.
+    number, leader = (np.insert(each, index + 1, each[index]) for each in led[:2])
+    first, gone = np.insert(led.share[:, 0], index + 1, at), np.insert(gone, index + 1, cuts)
+    last = np.where(np.diff(number, append=-1) == 0, np.append(first[1:], 1.0), 1.0)
+    move = np.searchsorted(led.number[starts], number)
+    # Travel to the nearer end of the move, from both ends of each interval.
+    gone = np.stack([gone[:-1], gone[1:]], axis=1)
+    rest = np.minimum(gone - begin[move, None], end[move, None] - gone)
+    change = np.where(rest.mean(axis=1) < ramp[move], np.sign(np.diff(rest)[:, 0]), 0.0)
+    speeds = np.full(rest.shape, speed)
+    if math.isfinite(acceleration):
+        speeds = np.sqrt(np.clip(2.0 * acceleration * rest, 0.0, speed**2))
+        change = acceleration * change
+    led = Intervals(number, leader, np.stack([first, last], axis=1))
+    takes_time = (travel.ways(led) > 0.0) & (speeds.sum(axis=1) > 0.0)
+    return TimeLaw(travel, led.select(takes_time), speeds[takes_time], change[takes_time])

@@ -1,7 +1,7 @@
 """Trajectories: paths over time, with the joints.
 
-The fastest actuator has the given speed all along, so no other is faster, or the path has a time
-law of `explorer.paths.time_law`. Samples are evenly spaced in time and lie on the path
+The path has a time law of `explorer.paths.time_law`: if none is given, the fastest actuator has a
+speed all along, so that no other is faster. Samples are evenly spaced in time and lie on the path
 exactly; their joints come from inverse kinematics.
 """
 
@@ -21,14 +21,12 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose, quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.time_law import TimeLaw
+from explorer.paths.time_law import TimeLaw, law_at_speed
 
 # The default speed of the fastest actuator, as a share of the reach per second.
 DEFAULT_SPEED = 0.1
 DEFAULT_SAMPLES = 201
 MOST_SAMPLES = 100_000
-# Steps of a move over which the actuators' travel is added up.
-STEPS = 32
 
 
 @dataclass(frozen=True)
@@ -82,8 +80,8 @@ def trajectory(
         law: Time law of the path, in place of a speed; None for the speed from start to end.
 
     Raises:
-        InputError: There are too few poses, too few or too many samples, the speed is not
-            positive or given beside a law, or the tool is not finite.
+        InputError: There are too few poses, too few or too many samples, the path has no length,
+            the speed is not positive or given beside a law, or the tool is not finite.
     """
     if len(poses) < 2:
         raise InputError("a trajectory needs a path of at least two poses")
@@ -94,21 +92,13 @@ def trajectory(
     actuator_speed = DEFAULT_SPEED * design.reach if speed is None else speed
     if not (math.isfinite(actuator_speed) and actuator_speed > 0.0):
         raise InputError(f"the speed must be above zero; got {actuator_speed:g}")
-    moves = StraightMoves.along(poses, tool)
-    count = len(poses) - 1
-    if law is None:
-        steps = np.linspace(0.0, 1.0, STEPS + 1, dtype=np.float64)
-        number, share = np.broadcast_arrays(np.arange(count)[:, None], steps)
-        joints = inverse(design, *moves.poses(number, share))
-        travels = np.abs(np.diff(joints, axis=1)).max(axis=-1).ravel()
-        times = np.concatenate([[0.0], np.cumsum(travels)]) / actuator_speed
-        sampled = np.linspace(0.0, float(times[-1]), samples, dtype=np.float64)
-        # A path without motion takes no time: all its samples are at its start.
-        at = np.interp(sampled, times, np.arange(len(times)) / STEPS)
-    else:
-        sampled = np.linspace(0.0, law.duration, samples, dtype=np.float64)
-        at = law.places(sampled)[0]
-    at[-1] = count
+    moves, count = StraightMoves.along(poses, tool), len(poses) - 1
+    law = law or law_at_speed(design, moves, actuator_speed)
+    sampled = np.linspace(0.0, law.duration, samples, dtype=np.float64)
+    motion = law.at(sampled)
+    at = motion.number + motion.share
+    # Moves without a length at either end take no time.
+    at[0], at[-1] = 0.0, count
     number = np.minimum(at.astype(np.int64), count - 1)
     position, rotation = moves.poses(number, at - number)
     quaternion = quaternion_from_rotation(rotation)

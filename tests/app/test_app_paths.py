@@ -186,6 +186,16 @@ def test_path_from_a_pose_to_itself_is_refused(start: End, goal: End) -> None:
             Go().apply(Set("paths.kind", kind).apply(state))
 
 
+def test_path_between_poses_that_differ_by_rounding_is_refused() -> None:
+    state = open_state(OPTIMAL)
+    x, y, z = state.pose.position
+    nearby = Pose((x + 1e-7, y, z), state.pose.quaternion)
+    with pytest.raises(InputError, match="are the same pose"):
+        Go().apply(with_ends(state, None, nearby))
+    with pytest.raises(InputError, match="the path has no length"):
+        Journey("planned", "Path", OPTIMAL, (state.pose, nearby))
+
+
 def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
     state = SetPathTime(0.3 * STRAIGHT_SECONDS).apply(start_between(1, 4))
     again = Go().apply(state)

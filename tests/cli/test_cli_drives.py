@@ -29,10 +29,21 @@ def test_drives_of_a_table_of_corners_and_their_csv_agree(cli: CommandLine, tmp_
     with out.open(encoding="utf-8", newline="") as stream:
         rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(stream)]
     assert len(rows) == 2001
-    for name, unit in (("speed", "mm/s"), ("force", "N"), ("power", "W")):
-        columns = [[row[f"{joint} {name} [{unit}]"] for row in rows] for joint in explorer.JOINTS]
-        peak = np.abs(columns).max(axis=1)
+    columns = {
+        name: np.array([[row[f"{q} {name} [{unit}]"] for q in explorer.JOINTS] for row in rows])
+        for name, unit in (("speed", "mm/s"), ("force", "N"), ("power", "W"))
+    }
+    for name, values in columns.items():
+        peak = np.abs(values).max(axis=0)
         np.testing.assert_allclose(peak, found[f"peak_{name}"], rtol=0.01, atol=1e-3)
+    power = 1e-3 * columns["force"] * columns["speed"]
+    np.testing.assert_allclose(columns["power"], power, rtol=1e-12, atol=1e-12)
+    few = cli.answer(*words, "--samples", "9", "--out", out)
+    assert few["peak_power"] == found["peak_power"]
+    with out.open(encoding="utf-8", newline="") as stream:
+        lines = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(stream)]
+    for line, row in zip(lines, rows[::250], strict=True):
+        assert line == pytest.approx(row, rel=1e-9, abs=1e-9)
     way = np.trapezoid([row["l4 speed [mm/s]"] for row in rows], dx=rows[1]["time_s"])
     assert way == pytest.approx(rows[-1]["l4 [mm]"] - rows[0]["l4 [mm]"], abs=1e-3)
     assert "One motor for all six needs at least" in cli.text(*words)
@@ -56,6 +67,45 @@ def test_drives_take_the_corners_of_a_planned_path_and_the_shortest_time_of_a_de
     binding = [each for limits in by_file["binding"] for each in limits]
     assert max(each["share"] for each in binding) == pytest.approx(1.0, abs=1e-6)
     assert {each["limit"] for each in binding} <= {"speed", "acceleration", "push"}
+
+
+@pytest.mark.parametrize("law", [("--speed", "10", "--acceleration", "1000"), ()])
+def test_drives_of_a_move_to_and_fro_are_those_of_both_moves(
+    cli: CommandLine, tmp_path: Path, law: tuple[str, ...]
+) -> None:
+    limits = explorer.Actuators(
+        push_n=same_for_all(150.0),
+        speed_mm_s=same_for_all(200.0),
+        acceleration_mm_s2=same_for_all(5000.0),
+    )
+    design = msgspec.structs.replace(explorer.PRESETS["paper-optimal"], actuators=limits)
+    words = ("--design", design, "--payload", "2", *law)
+    here, there = ("6", "-1", "7"), ("13", "5", "10")
+    file, ends = tmp_path / "path.csv", [here, there] * 13
+    file.write_text("\n".join(map(",".join, ["xyz", *ends, here])) + "\n", encoding="utf-8")
+    path = cli.answer("--path", file, *words)
+    ways = [cli.answer("--from", *e, "--to", *f, *words) for e, f in ((here, there), (there, here))]
+    times = [way["duration"] for way in ways]
+    assert path["duration"] == pytest.approx(13.0 * sum(times), rel=1e-9)
+    for name in ("peak_speed", "peak_force", "peak_power"):
+        expected = np.max([way[name] for way in ways], axis=0)
+        np.testing.assert_allclose(path[name], expected, rtol=1e-6)
+    for name, power in (("rms_force", 2), ("mean_power", 1)):
+        means = np.average([np.power(way[name], power) for way in ways], axis=0, weights=times)
+        np.testing.assert_allclose(np.power(path[name], power), means, rtol=1e-6)
+
+
+def test_corner_within_the_rounding_of_a_table_asks_nothing_more(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    file, lines = tmp_path / "path.csv", ["x_mm,y_mm,z_mm", "100,50,90", "100,50,110", "145,50,110"]
+    answers: list[dict[str, float]] = []
+    for more in ([], ["145,50.0000000001,110"], ["145,50.00001,110"]):
+        file.write_text("\n".join([*lines, *more]) + "\n", encoding="utf-8")
+        words = ["--path", file, "--payload", "2", "--duration", "0.5"]
+        answers.append(cli.answer(*words)["least_motor"])
+    for answer in answers[1:]:
+        assert answer == pytest.approx(answers[0], rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,12 @@ def test_path_forms_of_a_pose_agree(cli: CommandLine, words: list[str]) -> None:
         )
 
 
+def test_path_to_where_the_platform_is_is_refused(cli: CommandLine) -> None:
+    here = [f"{x:g}" for x in HOME.position]
+    assert "needs two poses that differ" in cli.refusal("--to", *here)
+    assert "needs two poses that differ" in cli.refusal("--to", *here, "--acceleration", "9")
+
+
 def test_path_without_solution_has_status_1_and_reason(cli: CommandLine) -> None:
     found = cli.answer("--to", "12", "8", "-7", status=1)
     assert found == {"found": False, "reason": "other mode", "poses": []}

@@ -17,12 +17,13 @@ import numpy as np
 
 from explorer.app.state.parts import TRANSIENT
 from explorer.errors import InputError
-from explorer.legs.moves import poses_between
+from explorer.legs.moves import StraightMoves, poses_between
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.number_text import format_number
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.paths.planning import DEFAULT_SECONDS
+from explorer.paths.time_law import law_at_speed
 from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
 
 Mode = Annotated[int, msgspec.Meta(ge=0, le=7)]
@@ -60,7 +61,7 @@ class Journey:
         tool: The tool point in the platform frame, if its moves are straight; None for those of b4.
 
     Raises:
-        InputError: Fewer than two corners.
+        InputError: Fewer than two corners, or all of them are the same pose.
     """
 
     kind: PathKind
@@ -74,6 +75,9 @@ class Journey:
     def __post_init__(self) -> None:
         if len(self.poses) < 2:
             raise InputError(f"a path has at least two corners; got {len(self.poses)}")
+        moves = StraightMoves.along(self.poses, self.tool)
+        if not moves.have_length(self.design.reach).any():
+            raise InputError("the path has no length: it needs two poses that differ")
 
     @property
     def trajectory(self) -> Trajectory:
@@ -151,11 +155,9 @@ class Paths:
 def _trajectory(
     design: Design, poses: tuple[Pose, ...], seconds: float | None, tool: Triple | None
 ) -> Trajectory:
-    timed = trajectory(design, poses, tool=tool)
-    if seconds is None or timed.duration == 0.0:
-        return timed
-    speed = DEFAULT_SPEED * design.reach * timed.duration / seconds
-    return trajectory(design, poses, speed=speed, tool=tool)
+    law = law_at_speed(design, StraightMoves.along(poses, tool), DEFAULT_SPEED * design.reach)
+    law = law if seconds is None else law.lasting(seconds)
+    return trajectory(design, poses, law=law, tool=tool)
 
 
 @lru_cache(maxsize=MOST_CACHED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path as File
@@ -72,12 +73,11 @@ class TimedOptions(
         start = options.make_pose(self, "from_", design.home_pose, self.from_, tool)
         return start, self.end(start, self.to, tool)
 
-    def law(self, design: Design, poses: Sequence[Pose]) -> TimeLaw | None:
-        """Return the time law of the path with these corners; None without an acceleration."""
-        if self.acceleration is None:
-            return None
+    def law(self, design: Design, poses: Sequence[Pose]) -> TimeLaw:
+        """Return the time law, at the speed and with the acceleration, of the path with corners."""
         moves, speed = StraightMoves.along(poses, self.tool(design)), self.speed
-        return law_at_speed(design, moves, speed or DEFAULT_SPEED * design.reach, self.acceleration)
+        speed = DEFAULT_SPEED * design.reach if speed is None else speed
+        return law_at_speed(design, moves, speed, self.acceleration or math.inf)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,10 +125,7 @@ class Path(TimedOptions):
                 output.write_json({"found": False, "reason": error.reason, "poses": []})
             raise
         law = self.law(design, path.poses)
-        speed = self.speed if law is None else None
-        timed = trajectory(
-            design, path.poses, speed=speed, samples=self.samples, tool=tool, law=law
-        )
+        timed = trajectory(design, path.poses, samples=self.samples, tool=tool, law=law)
         loads = None
         if self.load is not None:
             loads = path_loads(design, path.poses, self.load, tool=tool)
@@ -199,7 +196,7 @@ def _path_lines(
 
 @dataclass(frozen=True, kw_only=True)
 class Drives(TimedOptions):
-    """Compute speeds, forces and powers of the actuators along a path; the least motor.
+    """Compute speeds, forces and powers of the actuators along a path; one motor for all.
 
     A path rests at every corner. It takes the shortest time within the design's limits of speeds,
     accelerations and forces, which needs the extra `timing`; or `--duration`; or the time that
@@ -212,7 +209,8 @@ class Drives(TimedOptions):
     `explorer path --corners` writes."""
 
     duration: Annotated[values.Positive, values.hint("default: the shortest")] = None
-    """Duration in seconds, with the least acceleration of the fastest actuator."""
+    """Duration in seconds, in which the fastest actuator accelerates over one half of each move
+    and brakes over the other, always by the same."""
 
     payload: Annotated[values.NotNegative, values.OF_DESIGN] = None
     """Mass of the payload, in kg."""
@@ -232,7 +230,7 @@ class Drives(TimedOptions):
         if self.out is not None:
             check_writable(self.out)
         poses, tool = self._poses(design), self.tool(design)
-        law = self.law(design, poses)
+        law = None if self.acceleration is None else self.law(design, poses)
         if self.speed is not None and law is None:
             raise InputError("--speed needs --acceleration: a path starts and ends at rest")
         if self.duration is not None and law is not None:

@@ -77,8 +77,8 @@ def _svg(height: float, title: str, pieces: Iterable[Element]) -> Element:
 
 
 def _drawn(values: FloatArray) -> FloatArray:
-    """Return those of values (n, ...) that are drawn: the first of each interval, and the last."""
-    return np.concatenate([values[:: len(PARTS)], values[-1:]])
+    """Return those of values (n, ...) that are drawn: at both ends of each interval."""
+    return np.delete(values, slice(1, None, len(PARTS)), axis=0)
 
 
 def _ends(values: Iterable[float]) -> tuple[float, float]:

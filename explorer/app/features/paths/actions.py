@@ -14,6 +14,7 @@ from explorer.app.state.paths import End, Journey, Paths
 from explorer.app.state.state import Joints, State, joints_of
 from explorer.app.state.view import Weighed
 from explorer.errors import InputError
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import forward
 from explorer.mechanism.machine import Six
@@ -22,7 +23,7 @@ from explorer.numerics.number_text import format_number
 from explorer.paths.planning import PlannedPath, plan_path
 from explorer.statics.loaded import LoadedPose
 
-# Poses, and leg lengths over the reach, that differ by less are the same.
+# Leg lengths that differ by less, over the reach, are the same.
 SAME = 1e-9
 
 
@@ -118,9 +119,8 @@ def _legs(state: State) -> Joints:
 
 
 def _is_same(design: Design, start: Pose, goal: Pose) -> bool:
-    """Return whether two poses are the same, to rounding."""
-    apart = np.abs(np.subtract(start.position, goal.position)).max() / design.reach
-    return bool(max(apart, np.abs(start.rotation - goal.rotation).max()) <= SAME)
+    """Return whether two poses are the same to the rounding of a table."""
+    return not StraightMoves.along((start, goal)).have_length(design.reach).any()
 
 
 def _end_words(end: End) -> str:

@@ -32,7 +32,8 @@ class DrivesPanel:
         )
         controls.number(
             "Duration (s)",
-            "Time that the path takes, with the least acceleration of the fastest actuator.",
+            "Time that the path takes: in each move the fastest actuator accelerates over one half "
+            "of its travel and brakes over the other, always by the same.",
             "paths.duration",
             least=0.01,
             step=0.01,
