@@ -26,10 +26,11 @@ from scipy.sparse import csgraph
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import planes_of_singularity
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
+from explorer.numerics.roots import find_roots
 from explorer.singularity.colours import OUTLINE, SINGULAR, WARNED, Rgb, mix
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.workspace import PAIR_NAMES
-from explorer.workspace.faces.faces import Faces, divide, find_roots
+from explorer.workspace.faces.faces import Faces, divide
 from explorer.workspace.position_bands import PositionBands, PositionMeasure, position_bands
 from explorer.workspace.solids.solid import Solid
 

@@ -8,20 +8,18 @@ each edge that the line crosses gets one vertex.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
+from explorer.numerics.roots import find_roots
 from explorer.workspace.faces.surfaces import Smooth, Surfaces, pattern
 from explorer.workspace.limits.constraints import Constraint, Never
 from explorer.workspace.limits.region import box_of, contract_box
 from explorer.workspace.solids.facets import Box
-
-# Most steps of the search for a root on an edge.
-STEPS = 12
 
 
 class Division(NamedTuple):
@@ -59,36 +57,6 @@ def divide(faces: IntArray, high: BoolArray) -> Division:
         np.concatenate([faces[whole], *(np.stack(part, axis=1) for part in parts)]),
         np.concatenate([number[whole] == 3, lone_is_high, ~lone_is_high, ~lone_is_high]),
     )
-
-
-def find_roots(
-    value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray, tolerance: float
-) -> FloatArray:
-    """Return where n functions of a parameter from 0 to 1 are zero, shape (n,).
-
-    They are negative at 0 and not negative at 1. Their roots are found to a tolerance of their
-    values by the method of false position in the Illinois variant, which keeps the root between two
-    ends.
-    """
-    start, end = np.zeros(len(low)), np.ones(len(low))
-    at = -low / (high - low)
-    if not len(low):
-        return at
-    last = np.zeros(len(low), dtype=np.int64)
-    for _ in range(STEPS):
-        here = value(at)
-        if float(np.abs(here).max()) <= tolerance:
-            break
-        below = here < 0.0
-        side = np.where(below, -1, 1)
-        # An end that stays for the second time counts half.
-        again = side == last
-        low = np.where(below, here, np.where(again, 0.5 * low, low))
-        high = np.where(below, np.where(again, 0.5 * high, high), here)
-        start, end = np.where(below, at, start), np.where(below, end, at)
-        last = side
-        at = start + (end - start) * (-low / (high - low))
-    return at
 
 
 # Distances below this share of the size of a workspace are rounding; those of roots are

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.workspace.faces.faces import find_roots
+from explorer.numerics.roots import find_roots
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace, constraints
 from explorer.workspace.limits.region import region_of
 
