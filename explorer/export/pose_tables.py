@@ -1,8 +1,9 @@
 """Tables of poses and of joints as CSV: read with the units of their columns, answered by line.
 
 A heading is a name with a unit, such as `x_mm`, `x [mm]`, `x [10 mm]` or `yaw_deg`. Without a unit
-a length is in design units and an angle in degrees. Columns with other names are ignored, so that
-a trajectory and the answers of this module are tables too. What spreadsheets of any country write
+a length is in design units and an angle in degrees. Columns with other names are skipped, so that
+a trajectory and the answers of this module are tables too; one with a known name and an unknown
+unit is refused. What spreadsheets of any country write
 is read: columns separated by commas, semicolons or tabs, the latter two also with decimal commas,
 and a first line such as `sep=;`, which names the separator.
 """
@@ -10,6 +11,7 @@ and a first line such as `sep=;`, which names the separator.
 from __future__ import annotations
 
 import csv
+import difflib
 import io
 import math
 import re
@@ -67,6 +69,12 @@ _HEADING = re.compile(
     r"(\w+?)\s*(?:[\[(]\s*([-+.\de]*)\s*([a-z°]+)\s*[\])]"
     r"|[_\s]+(mm|cm|m|in|deg|degrees|rad|radians|s))?"
 )
+# A known name, and one word after it that can only be a unit.
+_UNKNOWN_UNIT = re.compile(
+    rf"({'|'.join(sorted(_UNITS, key=len, reverse=True))})(?:\s*[^\w\s][^a-z°]*|[\s_-]+)[^\s_]+"
+    rf"|({'|'.join(_UNITS)})({'|'.join([*_LENGTH, *_ANGLE, 's'])})"
+)
+_ANSWERED = ("line", "mode", "within_limits", "violations")
 
 
 class Column(NamedTuple):
@@ -102,6 +110,13 @@ class Table:
     def has_orientations(self) -> bool:
         """Whether a column states orientations."""
         return any(not self.columns.keys().isdisjoint(names) for names in _ROTATIONS)
+
+    @property
+    def skipped(self) -> tuple[str, ...]:
+        """The headings of the columns that are not known, nor written by the explorer."""
+        read = {column.place for column in self.columns.values()}
+        unread = (heading for place, heading in enumerate(self.headings) if place not in read)
+        return tuple(heading for heading in unread if heading not in ("", *_ANSWERED))
 
     @property
     def lines(self) -> list[int]:
@@ -181,14 +196,14 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
     for place, heading in enumerate(headings):
         match = _HEADING.fullmatch(heading.lower())
         if match is None or match[1] not in _UNITS:
+            if unknown := _UNKNOWN_UNIT.fullmatch(heading.lower()):
+                raise _wrong_unit(file, heading, unknown[1] or unknown[2])
             continue
         if match[1] in columns:
             raise InputError(f"{file} has two columns {match[1]}: leave one out")
         factor = _factor(match, unit_mm)
         if factor is None:
-            units, example = ", ".join(_UNITS[match[1]]), f"{match[1]}{_example(match[1])}"
-            needs = f"one of {units}, such as {example}" if units else "left out"
-            raise InputError(f"{file}, column {heading}: its unit must be {needs}")
+            raise _wrong_unit(file, heading, match[1])
         columns[match[1]] = Column(place, heading, factor)
     width = len(headings)
     for line, cells in rows[1:]:
@@ -201,6 +216,19 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
     places = [column.place for column in columns.values()]
     has_comma = separator != "," and any("," in cells[k] for _, cells in rows[1:] for k in places)
     return Table(file, headings, columns, rows[1:], "," if has_comma else ".")
+
+
+def _wrong_unit(file: str, heading: str, name: str) -> InputError:
+    """Return the error of a heading whose unit its name cannot have, with the nearest that can."""
+    units, needs = _UNITS[name], "left out"
+    if units:
+        headings = [f"{name} [{unit}]" if unit == "°" else f"{name}_{unit}" for unit in units]
+        (nearest,) = difflib.get_close_matches(heading.lower(), headings, 1, cutoff=0.0)
+        needs = f"one of {', '.join(units)}, such as {nearest}"
+    return InputError(
+        f"{file}, column {heading}: its unit must be {needs}; a column of anything else needs "
+        "another name"
+    )
 
 
 def _factor(match: re.Match[str], unit_mm: float) -> float | None:
@@ -265,6 +293,7 @@ class TableAnswer(NamedTuple):
         closing: Number of them that have a pose.
         within: Number of them with a pose within the limits.
         first: Line number and fault of the first line without a pose within the limits.
+        skipped: Headings of the columns of the given table that are not read.
     """
 
     csv: str
@@ -272,6 +301,7 @@ class TableAnswer(NamedTuple):
     closing: int
     within: int
     first: tuple[int, str] | None
+    skipped: tuple[str, ...]
 
 
 def inverse_answer(table: Table, poses: Configuration, at: Point = "b4") -> TableAnswer:
@@ -333,7 +363,9 @@ def _answer(
     start = ["line", *(f"{name}_s" for name in time), *length_heads(JOINTS, poses.design.unit_mm)]
     head = [*start, "mode", *heads, "within_limits", "violations"]
     text = "\n".join([",".join(head), *rows, ""])
-    return TableAnswer(text, len(closes), int(closes.sum()), int(within.sum()), first)
+    return TableAnswer(
+        text, len(closes), int(closes.sum()), int(within.sum()), first, table.skipped
+    )
 
 
 def _verdicts(poses: Configuration) -> tuple[list[str], IntArray, IntArray]:

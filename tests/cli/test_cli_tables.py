@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -169,6 +170,7 @@ def test_joints_that_do_not_close_are_told_and_the_others_answered(
         "lines": 3,
         "closing": 2,
         "within": 1,
+        "skipped": [],
         "first_outside": {"line": 4, "fault": "the lengths do not close"},
     }
     assert "line 4: the lengths do not close" in cli.text(*argv)
@@ -195,17 +197,35 @@ x,y,z/1,nan,3 | column y: 'nan': this must be a finite number
 x,y,z/1,2,1e300 | column z: '1e300': this must not exceed 1e+12
 x,y,z/1,5,2,3 | line 2 has 4 cells below 3 headings
 x,y,z/1,2 | line 2, column z: ''
-x_in,y-mm/1,2 | has no column y among x_in, y-mm; it needs x, y, z, each with its unit
+x_in,y-mm,z/1,2,3 | column y-mm: its unit must be one of mm, cm, m, in, such as y_mm; a column of
+x_in,v/1,2 | has no column y among x_in, v; it needs x, y, z, each with its unit
+x,y,z,yaw_degree,pitch_deg,roll_deg/1,2,3,4,5,6 | yaw_degree: its unit must be one of deg, °, degree
+x,y,z,yaw_degree/1,2,3,4 | such as yaw_degrees; a column of anything else needs another name
+x,y,z,azimuth [grad]/1,2,3,4 | azimuth [grad]: its unit must be one of deg, °, degrees, rad, radians
+x,y,z,Roll.deg/1,2,3,4 | column Roll.deg: its unit must be one of deg
+x,y,z,tilt°/1,2,3,4 | such as tilt [°]
+x,y,z [µm]/1,2,3 | column z [µm]: its unit must be one of mm, cm, m, in, such as z_
+xmm,y,z/1,2,3 | column xmm: its unit must be one of mm, cm, m, in, such as x_mm
+x,y,z,time_ms/1,2,3,4 | column time_ms: its unit must be one of s, such as time_s
+x,y,z,qw_x,qx,qy,qz/1,2,3,1,0,0,0 | column qw_x: its unit must be left out
 x,y,z,x_mm/1,2,3,4 | two columns x: leave one out
 x,y,z,yaw,qw/1,2,3,4,5 | the orientation twice
 x,y,z,yaw/1,2,3,4 | has no column pitch among x, y, z, yaw; it needs yaw, pitch, roll, each
-x [deg],y,z/1,2,3 | column x [deg]: its unit must be one of mm, cm, m, in, such as x_mm
+x [deg],y,z/1,2,3 | column x [deg]: its unit must be one of mm, cm, m, in, such as x_
 x,y,z,yaw_mm,pitch,roll/1,2,3,4,5,6 | its unit must be one of deg, °, degrees, rad, radians
 x,y,z,qw,qx,qy,qz/1,2,3,0,0,0,0 | line 2, column qw: '0': a quaternion must not be all zeros
 x,y,z | 1 to 100000 lines of numbers
 x,y,z/"1,2,3 | line 2, column x
 """
 """Tables, a slash between their lines, each with words of the message."""
+
+
+def test_columns_of_other_quantities_are_skipped_and_told() -> None:
+    heads = "note,x,y,z,speed,x2,l1 speed [mm/s],l1 force [N],z_offset_mm,roll number 3,psi,,mode"
+    answer = answer_to(f"{heads}\na,10,5,9,1,2,3,4,5,6,7,8,9")
+    left_out = {"x", "y", "z", "", "mode"}
+    assert answer.skipped == tuple(head for head in heads.split(",") if head not in left_out)
+    assert rows_of(answer) == rows_of(answer_to("x,y,z\n10,5,9"))
 
 
 @pytest.mark.parametrize("case", FAULTS.strip().splitlines())
@@ -215,6 +235,11 @@ def test_faults_are_told_with_line_and_column(case: str) -> None:
         answer_to(text.replace("/", "\n"))
     assert words in str(caught.value)
     assert str(caught.value).startswith("poses.csv")
+    # A heading that is offered is read.
+    for wrong, offered in re.findall(r"column (.+): its unit .*, such as (.+);", str(caught.value)):
+        mended = tables.parse_table("poses.csv", f"{offered}\n1".encode(), 1.0)
+        assert mended.columns.keys() == {re.split(r"[^a-z]", offered)[0]}
+        assert wrong[0].lower() == offered[0]
 
 
 def test_truncated_utf16_is_refused_in_one_sentence() -> None:

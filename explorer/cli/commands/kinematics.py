@@ -117,10 +117,12 @@ def _write_answer(
     lines.append(f"lines within the limits: {answer.within}")
     if line is not None:
         lines.append(f"first of the others, line {line}: {fault}")
+    if answer.skipped:
+        lines.append(f"columns that are not read: {', '.join(answer.skipped)}")
     command.write(
         lambda: {
             "file": out,
-            **output.attributes(answer, "lines closing within"),
+            **output.attributes(answer, "lines closing within skipped"),
             "first_outside": None if line is None else {"line": line, "fault": fault},
         },
         lines,
