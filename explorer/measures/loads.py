@@ -209,7 +209,7 @@ def _measure(
         statics = statics_of(case)
         if statics is None or statics.is_regular:
             return ""
-        return f"{singular}, where forces and errors are infinite"
+        return f"{singular}, where no unique forces hold a load and errors are infinite"
 
     def derivatives(case: Case) -> Mapping[str, float]:
         statics = statics_of(case)

@@ -84,7 +84,7 @@ class PoseIndices(Configuration):
 
     @property
     def transmission_index(self) -> FloatArray:
-        """The output transmission index: the least one of the six actuators, shape (...)."""
+        """The local transmission index, the least of `transmissions`, shape (...)."""
         return self.transmissions.min(axis=-1)
 
 

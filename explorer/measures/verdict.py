@@ -12,13 +12,14 @@ warning value of its own, and the pose is near a singularity if any is below:
   is a third of that of margins (`DISTANCE_SHARE`): the platform may turn as well as shift, so that
   its points move by less than the margin;
 - the least turn that leads to it (`explorer.singularity.freedoms`), below 10° (`WARN_TURN`). It is
-  a transmission angle: its sine is the share of a leg's force that acts, so that at 10° the legs
-  push six times as hard as where lines and planes are at right angles. Textbooks keep such angles
-  above 30° to 45° in continuous service; this value only warns of a singularity. A small platform
-  is displaced little by such a turn, a large one much, so that the distance alone is no measure;
+  no transmission angle: its sine is |δ1| or |δ3| over the distance of a1 and b4, whereas the share
+  of its force with which leg 1 resists a turn about the line b2b3 is |δ1| / l1, and that of leg 4
+  about the guide |δ3| / l4. A small platform is displaced little by such a turn, a large one much,
+  so that the distance alone is no measure;
 - the inverse condition number of J, below 0.01 (`WARN_CONDITION` in `explorer.singularity.colours`,
-  which the maps read too): a change of J by this share makes it singular (Eckart and Young). It
-  does not say how much forces and errors grow: that is one over the smallest singular value
+  which the maps read too): the smallest change that makes J singular is this share of J (Eckart
+  and Young); most changes of that size do not. It does not say how much forces and errors grow:
+  that is one over the smallest singular value
   (`explorer.singularity.ellipsoids.singular_values`). J is singular only where a margin is zero,
   but margins and distances do not bound its conditioning: in a nearly degenerate design, or far
   from the base, it is low in every pose. It counts for the incidence with the least scaled margin

@@ -351,7 +351,7 @@ def _indices() -> Iterable[Measure]:
     yield from _index(
         "transmission_index",
         "transmission index",
-        "output transmission index: the least cosine, over the actuators, of the angle between "
+        "local transmission index: the least cosine, over the actuators, of the angle between "
         "the actuator's force on the platform and the velocity of its point while the others are "
         "locked; 0 is singular, above 0.64 to 0.7 is called good (Wang, Wu and Liu 2010)",
         "global transmission index",

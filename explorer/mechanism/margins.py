@@ -36,7 +36,7 @@ INCIDENT = 1e-9
 """Tolerance of an incidence, by which a pose has its stratum: a share of the reach, or radians."""
 
 SINGULAR = 1e-13
-"""Share of |p| up to which a margin is rounding, so that forces are infinite."""
+"""Share of |p| up to which a margin is rounding, so that the pose counts as singular for loads."""
 
 LOST = 1e-13
 """Share of the largest singular value of J, or length of a plane's normal, that is rounding."""
@@ -95,7 +95,8 @@ def planes_of_singularity(rotation: ArrayLike) -> FloatArray:
     """Return the gradients of (δ1, δ2, δ3) with respect to p, shape (..., 3, 3), in rows.
 
     At a fixed orientation the singular positions are up to three planes through a1 with these
-    normals; the first and the third coincide where the planes of platform and base are parallel.
+    normals. The first two coincide where the guide is parallel to the platform plane, the last two
+    where b2b3 is parallel to the base plane, all three where platform and base are parallel.
     The gradient of δ2 has the length of the sine between the lines a1a2 and b2b3, which is zero
     if they are parallel; the others have unit length. The rotation has the shape (..., 3, 3).
     """

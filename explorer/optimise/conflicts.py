@@ -240,4 +240,5 @@ def _of_margins(intervals: Intervals) -> Iterator[Conflict]:
             yield Conflict("margin", f"{words} {demanded}")
         if needs_regular and max(own, other) <= rounding:
             words = f"the required box is on or across the singular plane δ{index + 1} = 0, where"
-            yield Conflict("singular plane", f"{words} no load is held and errors are infinite")
+            more = "no unique forces hold a load and errors are infinite"
+            yield Conflict("singular plane", f"{words} {more}")

@@ -158,7 +158,6 @@ def freedoms(configuration: Configuration) -> Freedoms:
     if distance > ZERO * reach:
         lines[2] = a1, p / distance
     locked = _locked_rates(c)
-    values = np.linalg.svd(locked, compute_uv=False)
     turns: list[FreeTurn] = []
     twists: list[FloatArray] = []
     for incidence, (point, direction) in lines.items():
@@ -176,7 +175,25 @@ def freedoms(configuration: Configuration) -> Freedoms:
             turns.append(FreeTurn(incidence, point, direction, bool(change <= ZERO * reach)))
             twists.append(twist)
     # A nearly degenerate design has singular values near the limit.
-    return Freedoms(max(int(np.sum(values <= ZERO)), len(turns)), tuple(turns))
+    return Freedoms(max(len(_free(locked)), len(turns)), tuple(turns))
+
+
+def free_twists(configuration: Configuration) -> FloatArray:
+    """Return a basis of the twists that locked actuators leave the platform in one pose.
+
+    It has the shape (n, 6), with n = 0 unless the pose is singular: the velocity of b4 over the
+    reach, and the angular velocity, base axes, of length one together. Tolerances are those of
+    `freedoms`.
+    """
+    if not incidences(stratum_of(configuration)):
+        return np.empty((0, 6))
+    return _free(_locked_rates(configuration))
+
+
+def _free(locked: FloatArray) -> FloatArray:
+    """Return a basis of the twists without any of these rates, shape (n, 6)."""
+    _, values, twists = np.linalg.svd(locked)
+    return twists[values <= ZERO]
 
 
 def _locked_rates(c: Configuration) -> FloatArray:

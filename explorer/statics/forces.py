@@ -3,7 +3,9 @@
 A load is a wrench (F; M) that acts on the platform at the tool point, along the axes of the base,
 in newtons and newtons times the design unit. A positive actuator force pushes its joint's value
 up. The legs are weightless: legs 1 and 4 then carry forces along their axes only; legs 2 and 3 also
-carry a force along the guide, which bends their struts. In a singular pose all forces are infinite.
+carry a force along the guide, which bends their struts. In a singular pose no forces hold a load
+that does work in a motion which locked actuators leave free, and no unique ones hold any other; all
+results are infinite there (`explorer.statics.loaded.LoadedPose.moves_platform` tells which it is).
 
 With u the direction of b2b3 and M the moment about b4, leg 1 alone resists a turn about the line
 b2b3 and leg 4 alone a turn about the guide:
@@ -172,8 +174,8 @@ def load_array(load: ArrayLike) -> FloatArray:
 def forces_of(configuration: Configuration, load: ArrayLike) -> FloatArray:
     """Return the actuator forces f = −J⁻ᵀ (F; M) that hold a load, shape (..., 6), in newtons.
 
-    Their order is that of `JOINTS`. All six are infinite in a singular pose. The load acts at the
-    tool point, see `load_array`.
+    Their order is that of `JOINTS`. All six are infinite in a singular pose, whatever the load. The
+    load acts at the tool point, see `load_array`.
 
     Raises:
         InputError: The load is unusable, or batch axes do not broadcast.

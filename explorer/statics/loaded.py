@@ -13,7 +13,8 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, Design
 from explorer.mechanism.machine import Payload, Six
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.singularity.freedoms import ZERO, free_twists
 from explorer.statics import accuracy, compliance as elasticity
 from explorer.statics.forces import twists_of_actuators
 from explorer.statics.reactions import (
@@ -97,8 +98,26 @@ class LoadedPose:
 
     @cached_property
     def is_regular(self) -> bool:
-        """Whether forces hold the load: whether the pose is not singular."""
+        """Whether unique forces hold any load: whether the pose is not singular."""
         return bool(np.isfinite(self.reactions.actuators).all())
+
+    @cached_property
+    def moves_platform(self) -> bool:
+        """Whether the load does work in a motion that locked actuators leave free.
+
+        No forces hold such a load. Any other load is held in a singular pose, too, but by no unique
+        forces: those that balance each other can be added.
+        """
+        at_b4 = Configuration.at(self.design, self.pose)
+        twists, reach = free_twists(at_b4), self.design.reach
+        velocities, turning = reach * twists[:, :3], twists[:, 3:]
+        at_tool = velocities + np.cross(turning, self.pose.rotation @ np.array(self.tool))
+        force, moment = np.split(self.carried.wrench + self.load, 2)
+        work = np.abs(at_tool @ force + turning @ moment)
+        size = reach * np.linalg.norm(force) + np.linalg.norm(moment)
+        is_pushed = self.design.payload.force_n > 0.0
+        is_moved = is_pushed & (lengths_of(at_tool) > ZERO * reach)
+        return bool(np.any((work > ZERO * size) | is_moved))
 
     @property
     def worst(self) -> int:

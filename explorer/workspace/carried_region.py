@@ -96,7 +96,7 @@ def carried_region(
 ) -> CarriedRegion:
     """Return the positions at which the machine carries a load within its limits.
 
-    Beyond a singular plane no load is held on the way, so that only positions with the signs of
+    On a singular plane no unique forces hold a load, so that only positions with the signs of
     the margins count that the home pose has in its own orientation. The payload's weight and its
     force of any direction act besides the load; the legs count as weightless. The volume is off by
     about half a percent at most, that of a part below a thousandth of the workspace by a few

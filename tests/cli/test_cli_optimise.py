@@ -222,7 +222,7 @@ def test_optimise_refuses_a_box_where_no_load_is_held(
 
     monkeypatch.setattr("explorer.optimise.solver.optimise_design", never)
     refused = cli.refusal(*LOADED, "--box", "none", *argv, *box, status=1)
-    assert "singular plane δ3 = 0, where no load is held" in refused
+    assert "singular plane δ3 = 0, where no unique forces hold a load" in refused
     found = cli.answer(*LOADED, "--box", "none", *argv, *box, status=1)
     assert (found["objective"], found["holding"]) == (
         None,

@@ -264,3 +264,15 @@ def test_budget_about_singular_positions_has_no_answer(cli: CommandLine) -> None
     assert "the pose is singular" in cli.refusal("budget", "--position", "3", "4", "0", status=1)
     unboxed = OPTIMAL.with_limits(box=None)
     assert "need a box" in cli.refusal("budget", "--over", "box", "--design", unboxed)
+
+
+@pytest.mark.parametrize(
+    ("load", "words"),
+    [(("0", "0", "-10"), "no forces hold it"), (("10", "0", "0"), "held, but by no unique forces")],
+)
+def test_forces_in_a_singular_pose_say_whether_the_load_is_held(
+    cli: CommandLine, load: tuple[str, ...], words: str
+) -> None:
+    given = ("forces", "--position", "10", "5", "0", "--load", *load)
+    assert words in cli.refusal(*given, status=1)
+    assert words in cli.answer(*given, status=1)["message"]

@@ -1,4 +1,4 @@
-"""A required box on or across a singular plane: no load is held there, and errors are infinite."""
+"""A required box on or across a singular plane, where no unique forces hold a load."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ DEMANDS: tuple[dict[str, Any], ...] = (
 )
 # Places of the near face of a box, beyond a plane where they are negative.
 BESIDE = (-0.5, -1e-3, -1e-9, 0.0, 1e-9, 1e-3)
-# Orientations by yaw, pitch and roll; where the platform is level, two planes are the same.
+# Orientations by yaw, pitch and roll; where the platform is level, all planes are the same.
 TURNS = ((-73.1, 0.0, 0.0), (-70.0, 12.0, -8.0), (35.0, -20.0, 25.0))
 
 

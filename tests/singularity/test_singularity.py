@@ -10,6 +10,7 @@ from differences import assert_is_jacobian
 from hypothesis import assume, given, strategies as st
 from incidence import distance_of_lines, distance_to_plane, tetrahedron_volume
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
 from strategies import (
     EPSILON,
     Case,
@@ -21,9 +22,9 @@ from strategies import (
     singular_cases,
 )
 
-from explorer import PRESETS, evaluate, inverse, jacobian, margins, rotation_from_quaternion
+from explorer import PRESETS, Design, evaluate, inverse, jacobian, margins, rotation_from_quaternion
 from explorer.mechanism.kinematics import determinant, tetrahedron_volumes
-from explorer.mechanism.margins import TETRAHEDRA
+from explorer.mechanism.margins import TETRAHEDRA, planes_of_singularity
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
@@ -188,3 +189,28 @@ def test_jacobian_row_of_a_leg_of_no_length_is_zero(position: list[float], row: 
     assert_array_equal(case.at.jacobian[row], 0.0)
     assert condition_of(case) == 0.0
     assert determinant_of(case) == 0.0
+
+
+# Pairs of the planes of δ1, δ2 and δ3.
+PAIRS = ((0, 1), (1, 2), (0, 2))
+
+
+# The guide parallel to the platform plane, b2b3 parallel to the base plane, both, and neither.
+@pytest.mark.parametrize(
+    ("axes", "coincident"),
+    [("XZ", {(0, 1)}), ("ZX", {(1, 2)}), ("Z", set(PAIRS)), ("XYZ", set[tuple[int, int]]())],
+)
+@given(st.lists(st.floats(0.2, 1.3), min_size=3, max_size=3))
+def test_singular_planes_coincide_where_a_line_of_one_flag_is_parallel_to_the_plane_of_the_other(
+    axes: str, coincident: set[tuple[int, int]], angles: list[float]
+) -> None:
+    rotation = Rotation.from_euler(axes, angles[: len(axes)]).as_matrix()
+    planes = planes_of_singularity(rotation)
+    units = planes / np.linalg.norm(planes, axis=-1, keepdims=True)
+    found = {pair for pair in PAIRS if np.linalg.norm(np.cross(*units[list(pair)])) < 1e-12}
+    assert found == coincident
+
+
+@pytest.mark.parametrize("design", PRESETS.values(), ids=PRESETS.keys())
+def test_singular_positions_at_the_papers_home_are_one_plane(design: Design) -> None:
+    assert np.linalg.matrix_rank(planes_of_singularity(design.home_pose.rotation)) == 1

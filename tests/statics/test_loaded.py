@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from statics_cases import LegMasses
 
 from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Tolerances, Tool
+from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.pose import Pose
@@ -88,6 +89,30 @@ def test_loaded_pose_without_limits_holds_any_load_and_a_singular_one_holds_none
     assert loaded.share == loaded.unit_force.share == worst.share == share
     assert loaded.largest_payload == payload
     assert np.isnan(worst.direction).all()
+
+
+def test_load_in_a_singular_pose_moves_the_platform_unless_some_forces_hold_it() -> None:
+    rng, tool = np.random.default_rng(7), (1.0, -2.0, 3.0)
+    for loaded in loaded_poses(OPTIMAL, 8):
+        for nearest in Snapshot(OPTIMAL, loaded.pose).nearest:
+            rows = Configuration.at(OPTIMAL, nearest.pose, tool).jacobian.T
+            balanced = rng.normal(size=6)
+            for load, by_some in ((-rows @ balanced, True), (rng.normal(size=6), False)):
+                there = LoadedPose(OPTIMAL, nearest.pose, six(load), point=tool)
+                forces, _, rank, _ = np.linalg.lstsq(-rows, load, rcond=1e-9)
+                # Others hold it as well: those that balance each other can be added.
+                assert rank == 5
+                assert np.allclose(-rows @ forces, load, atol=1e-7) == by_some
+                assert there.moves_platform != by_some
+    assert not LoadedPose(OPTIMAL, HOME, six(rng.normal(size=6))).moves_platform
+
+
+def test_force_of_any_direction_moves_the_platform_in_a_singular_pose() -> None:
+    pose = Snapshot(OPTIMAL, HOME).nearest[0].pose
+    design = msgspec.structs.replace(OPTIMAL, payload=Payload(force_n=1.0))
+    # The turn about the line b2b3 leaves b4 where it is.
+    for tool, moves in (((0.0, 1.0, 0.0), True), ((0.0, 0.0, 0.0), False)):
+        assert LoadedPose(design, pose, point=tool).moves_platform == moves
 
 
 def test_parts_with_a_limit_are_those_whose_share_a_load_changes() -> None:

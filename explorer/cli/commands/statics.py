@@ -22,7 +22,6 @@ from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import DIMENSIONS, Six
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics import accuracy, budget as budgets, forces, loaded
@@ -52,15 +51,13 @@ class LoadOptions(options.JsonOptions, options.PoseOptions):
         )
 
 
-def check_regular(pose: Pose, results: FloatArray, infinite: str) -> None:
-    """Check that results of a pose are finite, and name what is infinite in a singular one."""
-    if np.isfinite(results).all():
-        return
+def singular_error(pose: Pose, words: str) -> NoAnswerError:
+    """Return the error of a singular pose, given words on what that means."""
     least = forces.SINGULAR * float(np.linalg.norm(pose.position))
     margin = np.abs(margins(pose.position, pose.rotation))
     zero = [f"δ{k + 1} = 0: {INCIDENCES[k]}" for k in np.flatnonzero(margin <= least)]
     named = "; ".join(zero) or "a margin vanishes to rounding"
-    raise NoAnswerError(f"the pose is singular ({named}): {infinite} are infinite")
+    return NoAnswerError(f"the pose is singular ({named}): {words}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,11 +89,10 @@ class Forces(LoadOptions):
         design = self.read_loaded_design()
         pose, tool = self.pose(design), self.tool(design)
         configuration = Configuration.at(design, pose, tool)
-        check_regular(
-            pose, forces.twists_of_actuators(configuration), "the forces that hold a load"
-        )
         weights = self._own_weights(design)
         found = loaded.LoadedPose(design, pose, self.load, weights, point=tool or B4)
+        if not np.isfinite(forces.twists_of_actuators(configuration)).all():
+            raise singular_error(pose, f"the {blocks.in_singular_pose(found)}")
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most
         nearest = None
         if found.share > 1.0:
@@ -191,7 +187,8 @@ class Accuracy(options.TypicalOptions, LoadOptions):
         design, assumed = self.with_typical(design)
         pose, tool = self.pose(design), self.tool(design)
         found = loaded.ToolPrecision(loaded.LoadedPose(design, pose, self.load, point=tool or B4))
-        check_regular(pose, found.by_source, "errors and compliance")
+        if not np.isfinite(found.by_source).all():
+            raise singular_error(pose, "errors and compliance are infinite")
         self.write(
             lambda: {**_accuracy_json(found), "assumed": assumed},
             chain(

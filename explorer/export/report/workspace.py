@@ -256,10 +256,10 @@ def _over_the_workspace(
     if isinstance(data.solid, Solid) and not data.solid.is_empty:
         yield _share_slices(data, data.solid)
     yield paragraph(
-        "Towards a singular plane every force and every share grows without bound, so that no "
-        "machine holds the payload up to it. Positions beyond one, where a margin has another sign "
-        "than at home, do not count as held, whatever their shares: nothing holds the payload on "
-        "the way."
+        "Towards a singular plane forces and shares grow without bound, unless the payload does no "
+        "work in the motion that becomes free there. Positions beyond one, where a margin has "
+        "another sign than at home, do not count as held, whatever their shares: on the way no "
+        "unique forces hold the payload."
     )
 
 

@@ -27,7 +27,7 @@ def utilisations(loaded: LoadedPose) -> list[float | None]:
 def verdict(loaded: LoadedPose, load: str = "load") -> block.Statement:
     """Return whether a load, such as a "payload", is held, and the part nearest to its limit."""
     if not loaded.is_regular:
-        return block.Statement("Singular pose", "The forces are infinite.", "beyond")
+        return block.Statement("Singular pose", f"The {in_singular_pose(loaded, load)}.", "beyond")
     if not has_limits(loaded.design):
         words = "Shares need limits of the actuators, the struts or the guide."
         return block.Statement("No limits are given", words)
@@ -41,8 +41,21 @@ def verdict(loaded: LoadedPose, load: str = "load") -> block.Statement:
     return block.Statement(f"Holds the {load}{near}", words, look)
 
 
+def in_singular_pose(loaded: LoadedPose, load: str = "load") -> str:
+    """Return what a load does to a singular pose, which no unique forces hold, in words."""
+    work, held = "no work", "it is held, but by no unique forces"
+    if loaded.moves_platform:
+        work, held = "work", "no forces hold it"
+    return f"{load} does {work} in a motion that locked actuators leave free: {held}"
+
+
 def reaction_tables(loaded: LoadedPose) -> Iterator[block.Block]:
-    """Yield the forces of the actuators, and the loads of struts and guide, beside their limits."""
+    """Yield the forces of the actuators, and the loads of struts and guide, beside their limits.
+
+    There are none in a singular pose.
+    """
+    if not loaded.is_regular:
+        return
     result, design = loaded.reactions, loaded.design
     spread = np.where(np.isfinite(result.spread), result.spread, 0.0)
     push, pull = (side.tolist() for side in design.actuators.limits)

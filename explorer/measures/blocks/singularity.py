@@ -34,8 +34,7 @@ def colour_words(warn: Warnings, unit: Unit) -> str:
         "The colour of an incidence: the least of its measures over their warning values, which "
         f"are {unit.text(warn.margin, 3)} of the margin, "
         f"{unit.text(warn.distance, 3)} of motion, "
-        f"{format_number(math.degrees(warn.turn), 3)}° of turning (a transmission angle, which "
-        "mechanisms usually keep above 30° to 45°), and "
+        f"{format_number(math.degrees(warn.turn), 3)}° of turning, and "
         f"{format_number(warn.condition, 3)} of 1/cond J"
     )
 
@@ -66,8 +65,7 @@ def margin_table(snapshot: Snapshot, unit: Unit | None = None) -> block.Table:
                          hint="To the nearest pose with δ = 0: the root-mean-square displacement "
                          "of b1 to b4 (Nawratil's metric)."),
             block.Column("turn", turns, "°", 3, span=90.0,
-                         hint="The least turn about b4 or a1 that leads to δ = 0, a transmission "
-                         "angle."),
+                         hint="The least turn about b4 or a1 that leads to δ = 0."),
         ),
         f"{MARGIN_KINDS}; the signs of the three name the assembly mode. Motions are the "
         "root-mean-square displacement of b1 to b4 (Nawratil's metric), turns the least about b4 "
@@ -142,7 +140,7 @@ def conditioning(snapshot: Snapshot, unit: Unit = UNITS) -> block.Facts:
             block.Fact(
                 "transmission index",
                 (*_ratio(snapshot.transmission_index), f" ({JOINTS[worst]})"),
-                hint="Output transmission index of the worst actuator, the cosine between its "
+                hint="Local transmission index: of the worst actuator, the cosine between its "
                 "force and the motion that it causes; 0 is singular, good above 0.64 to 0.7",
             ),
             block.Fact(
