@@ -1,4 +1,4 @@
-"""Run the benchmarks: `python tests/benchmarks [--list] [NAME ...]`."""
+"""Run the benchmarks: `python tests/benchmarks [--list] [--short] [NAME ...]`."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 # Run as a folder, so the package and the project are made importable by their names.
 TESTS = Path(__file__).resolve().parents[1]
@@ -46,6 +47,9 @@ def main() -> None:
         description="Measure the explorer and print one table. No time is asserted.",
     )
     parser.add_argument("name", nargs="*", help="run only these, see --list (default: all)")
+    parser.add_argument(
+        "--short", action="store_true", help="see whether they run: few repeats of small tasks"
+    )
     parser.add_argument("--list", action="store_true", help="list the names and leave")
     options = parser.parse_args()
     names: list[str] = options.name or list(BENCHMARKS)
@@ -60,7 +64,12 @@ def main() -> None:
     for name in names:
         start = time.monotonic()
         # Only now is what it needs imported.
-        rows += importlib.import_module(f"benchmarks.{name}").run()
+        benchmark: Any = importlib.import_module(f"benchmarks.{name}")
+        if options.short:
+            # The sizes and repeats of a short round, by the names of the module's constants.
+            for constant, value in benchmark.SHORT.items():
+                setattr(benchmark, constant, value)
+        rows += benchmark.run()
         sys.stderr.write(f"{name}: {time.monotonic() - start:.0f} s\n")
     print(f"{describe()}\n\n{as_text(rows)}")
 

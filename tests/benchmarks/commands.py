@@ -18,6 +18,7 @@ from explorer.mechanism.design_file import encode_design
 from explorer.workspace.accessible.radii import with_radius
 
 RUNS, REPORTS = 9, 3
+SHORT = {"RUNS": 1, "REPORTS": 1}
 POSE = ("--position", "10", "5", "9", "--yaw-pitch-roll", "-73", "0", "0")
 # What tells the same figures, one by one, and one picture.
 SINGLE = (

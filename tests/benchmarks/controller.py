@@ -30,6 +30,7 @@ NEARLY_FLAT = 1.0
 # Random starts from which the iteration looks for all modes of some joints.
 STARTS, VECTORS = 50, 200
 UNIT = DESIGN.unit_mm
+SHORT = {"COUNT": 300, "CACHED": 50, "ROUNDS": 1, "STARTS": 10, "VECTORS": 5}
 
 
 class Found(NamedTuple):

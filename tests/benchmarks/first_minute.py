@@ -32,6 +32,7 @@ warm()
 SIZE = (1440, 900)
 # Milliseconds that the page is waited for.
 PATIENCE = 180_000.0
+SHORT = {"RUNS": 1}
 
 
 def run() -> Iterator[Row]:

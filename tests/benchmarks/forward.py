@@ -27,6 +27,7 @@ SEARCHES, SEARCH_ROUNDS = 300, 5
 OFF_BY = 0.02
 # Residuals below this share of the size count as closed.
 CLOSED = 1e-9
+SHORT = {"COUNT": 1_000, "CALLS": 20, "ROUNDS": 1, "SEARCHES": 5, "SEARCH_ROUNDS": 1}
 
 
 class LoopEquations:

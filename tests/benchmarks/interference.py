@@ -25,6 +25,7 @@ POSES = 100_000
 MOVES = 20_000
 NODES, RADIUS = 40, 0.2
 ROUNDS = 20
+SHORT = {"PAIRS_COUNT": 2_000, "OBJECTS": 50, "POSES": 500, "MOVES": 50, "NODES": 12, "ROUNDS": 4}
 
 
 def mixed_pairs(count: int) -> tuple[FloatArray, FloatArray]:

@@ -21,6 +21,7 @@ from explorer.singularity.nearest_stratum import nearest_in_strata
 CALLS, POSES, SEARCHES, MOVES = 200, 5_000, 10, 100
 # So many that the search, too, finds the nearest for nearly all poses.
 STARTS = 12
+SHORT = {"CALLS": 5, "POSES": 50, "SEARCHES": 1, "MOVES": 3, "STARTS": 3}
 
 
 def run() -> Iterator[Row]:

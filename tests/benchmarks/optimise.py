@@ -30,6 +30,7 @@ ENOUGH, MOST_EVALUATIONS = 1e-9, 1000
 # Where no demand is missed by more than this.
 MET = 1e-6
 RANDOM_STARTS, CONVERGED = 100, 1e-6
+SHORT = {"ROUNDS": 1, "MOST_EVALUATIONS": 20, "RANDOM_STARTS": 2, "STARTS": 1}
 # Problems without and with a clearance, by the words of the table.
 CASES = (("off", None), (f"on ({CLEARANCE:g})", CLEARANCE))
 

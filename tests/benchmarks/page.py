@@ -22,7 +22,14 @@ from benchmarks.table import Row, seconds
 from explorer import PRESETS
 from explorer.app.browser.headless import find_chromium, headless_browser
 from explorer.app.browser.viser_gaps import mark_broadcasts
-from explorer.app.screenshot import AWAIT_FRAMES, PATIENCE_SECONDS, SCENE_CANVAS, open_page, settle
+from explorer.app.screenshot import (
+    AWAIT_FRAMES,
+    PATIENCE_SECONDS,
+    PICTURES,
+    SCENE_CANVAS,
+    open_page,
+    settle,
+)
 from explorer.app.server import Running, start
 from explorer.numerics.compiled import warm
 
@@ -30,11 +37,14 @@ RUNS = 5
 SIZE = (1280, 800)
 # Frames of one run, after one that may have waited for the last of the other page.
 FRAMES = 4
+SHORT = {"RUNS": 1}
 # three.js hands its renderer to a scene that is drawn; from then on it draws only on demand.
 HOLD_RENDERER = """() => new Promise((resolve) => {
     const { scene, requestRender } = window.__viserMutable;
-    scene.onBeforeRender = (renderer) => {
-        scene.onBeforeRender = () => {};
+    const before = scene.onBeforeRender;
+    scene.onBeforeRender = (renderer, ...others) => {
+        scene.onBeforeRender = before;
+        before(renderer, ...others);
         const render = renderer.render.bind(renderer);
         renderer.render = (...parts) => window.isDrawing && render(...parts);
         resolve();
@@ -163,6 +173,7 @@ def _ready(browser: Browser, server: viser.ViserServer) -> float:
     known = set(server.get_clients())
     page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
     page.set_default_timeout(1000.0 * PATIENCE_SECONDS)
+    page.add_init_script(PICTURES)
     start = time.perf_counter()
     page.goto(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=1")
     while not (new := set(server.get_clients()) - known):

@@ -29,6 +29,7 @@ PATHS, SECONDS = 100, 2.0
 RADIUS = 0.2
 THICK = with_radius(DESIGN, RADIUS)
 LOWS, HIGHS = [0.0, -12.0, 0.0], [20.0, 22.0, 18.0]
+SHORT = {"LINES": 50, "PAIRS": 20, "PATHS": 2}
 
 
 def random_pairs() -> Iterator[tuple[Pose, Pose]]:

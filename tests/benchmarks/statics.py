@@ -50,6 +50,7 @@ from explorer.statics.compliance import (
 from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, twists_of_actuators
 
 FORCE_POSES, POSES, ROUNDS = 100_000, 10_000, 10
+SHORT = {"FORCE_POSES": 500, "POSES": 100, "ROUNDS": 1}
 TENTH = (0.1, 0.1, 0.1)
 MACHINE = msgspec.structs.replace(
     DESIGN,

@@ -27,6 +27,7 @@ from explorer.sweep.workers import LocalWorkers, Workers
 
 NODES, DESIGNS, BY_HAND, SHARED, ROUNDS = 20, 256, 32, 3072, 3
 CHUNK, SIZES = 1024, (1_000, 50_000, 1_000_000)
+SHORT = {"DESIGNS": 4, "BY_HAND": 2, "SHARED": 64, "ROUNDS": 1, "SIZES": (100,)}
 
 STUDY = msgspec.structs.replace(
     STUDIES["trade-off"],

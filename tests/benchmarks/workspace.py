@@ -33,6 +33,7 @@ ROUNDS = 10
 VOLUME_CALLS, VOXELS = 20, 480
 TOLERANCE, SOLID_ERROR = 0.1, 1e-3
 FINE, HELD_ERROR = 50, 5e-3
+SHORT = {"ROUNDS": 1, "VOLUME_CALLS": 1, "VOXELS": 60, "SOLID_ERROR": 1e-2, "HELD_ERROR": 5e-2}
 LOADED = msgspec.structs.replace(
     DESIGN,
     payload=Payload(2.0, (1.0, 2.0, 3.0)),

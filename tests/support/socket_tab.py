@@ -60,6 +60,11 @@ class SocketTab:
             }
         )
 
+    def flush(self) -> None:
+        """Return once all that was sent has arrived."""
+        with suppress(ConnectionClosed):
+            self._connection.ping().wait(30.0)
+
     def close(self) -> None:
         """Close as a browser does."""
         self._connection.close()
