@@ -40,7 +40,7 @@ from explorer.app.features.prototype.work import (
 )
 from explorer.app.features.sharing.feature import ExportDialog
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import Open, SetPose, SetPosition, SetVariable
+from explorer.app.state.actions import Open, Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrototypeView
@@ -48,6 +48,7 @@ from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.markup import status
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.machine import Payload
 from explorer.mechanism.pose import Pose
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places
@@ -308,13 +309,18 @@ def test_verdict_is_the_same_everywhere_and_its_presses_mend_what_it_names(
             assert any(words in str(value) for *_, value in panel.updates(Frame(state)))
         return words
 
-    desk.session.do(Open(msgspec.structs.replace(OPTIMAL, unit_mm=unit)))
+    desk.session.do(Set("view.lengths", "mm"))
+    carrying = msgspec.structs.replace(OPTIMAL, payload=Payload(1.0, (1.0, 2.0, 3.0)))
+    desk.session.do(Open(msgspec.structs.replace(carrying, unit_mm=unit)))
     if unit != OPTIMAL.unit_mm:
         assert "Carriages 2 and 3 at home are 2.01 mm apart and need 2.6 mm." in show(desk.state)
         assert ">Set the unit to 3.89 mm<" in show(desk.state)
         assert "Buildable" in verdict.in_bar(Frame(desk.state))
         desk.press(services.buttons, MEND, FITTING)
-        assert desk.state.design == msgspec.structs.replace(OPTIMAL, unit_mm=3.89)
+        # The payload stays where it is on the platform, 3 mm, 6 mm and 9 mm from b4.
+        x, y, z = (float(f"{3.0 * each / 3.89:.15g}") for each in (1.0, 2.0, 3.0))
+        payload = Payload(1.0, (x, y, z))
+        assert desk.state.design == msgspec.structs.replace(OPTIMAL, unit_mm=3.89, payload=payload)
         # What was found for the design before the press does nothing to this one.
         desk.press(services.buttons, MEND, FITTING)
         assert desk.state.design.unit_mm == 3.89

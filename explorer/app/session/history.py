@@ -206,7 +206,8 @@ def restore(history: History, present: State) -> tuple[State, History]:
             "the design is being optimised: cancel that first, then undo what led to it"
         )
     step = history.step.state
-    state = replace(step, view=_with_point_of(present.view, step.view))
+    view = present.in_unit_of(step.design).view
+    state = replace(step, view=_with_point_of(view, step.view))
     # No number of a request is used twice.
     request = max(state.paths.request, present.paths.request)
     restored = replace(

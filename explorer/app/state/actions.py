@@ -96,7 +96,8 @@ class Open(Action):
             InputError: The design is being optimised.
         """
         check_free(state)
-        return replace(open_state(self.design), **parts_kept_on_open(state))
+        kept = parts_kept_on_open(state.in_unit_of(self.design))
+        return replace(open_state(self.design), **kept)
 
 
 @dataclass(frozen=True)

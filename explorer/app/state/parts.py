@@ -1,9 +1,9 @@
 """Parts of the state: values by path, and what a file and another design leave of each.
 
 A path is such as "view.singular.ball" or "view.tetrahedra.0". Each field of the state, and of its
-parts, declares as its metadata what becomes of it when the state is saved, and when another design
-is opened. A field that declares nothing is saved, and is that of a new state once another design is
-opened.
+parts, declares as its metadata what becomes of it when the state is saved, when another design is
+opened, and when the design unit changes. A field that declares nothing is saved, is that of a new
+state once another design is opened, and keeps its numbers in another unit.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from dataclasses import Field, fields, is_dataclass, replace
 from typing import Any, Self, TypeVar, cast
 
 import msgspec
+
+from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import Unit
 
 TRANSIENT: Mapping[str, Any] = {"is_saved": False}
 """Metadata of a field that no file holds: it describes work under way, or is computed again."""
@@ -27,6 +30,16 @@ STAYS: Mapping[str, Any] = {"on_open": _identity}
 
 Another function as `on_open` takes the value and returns what stays of it.
 """
+
+LENGTHS: Mapping[str, Any] = {"power": 1}
+"""Metadata of a field with lengths, or with a part whose fields declare some.
+
+Users have asked for them in the unit that the page shows. They keep their values in it when the
+design unit changes, see `in_unit`.
+"""
+
+VOLUME: Mapping[str, Any] = {"power": 3}
+"""Metadata of a field with a volume, likewise."""
 
 
 class FeaturePart:
@@ -62,6 +75,9 @@ def saved_fields(kind: Any) -> tuple[Field[Any], ...]:
     return tuple(field for field in fields(kind) if field.metadata.get("is_saved", True))
 
 
+Whole = TypeVar("Whole")
+
+
 def parts_kept_on_open(state: Any) -> dict[str, Any]:
     """Return what stays of a state when another design is opened, by field."""
     return {
@@ -71,7 +87,34 @@ def parts_kept_on_open(state: Any) -> dict[str, Any]:
     }
 
 
-Whole = TypeVar("Whole")
+def in_unit(part: Whole, before: Unit, after: Unit, power: int = 1) -> Whole:
+    """Return a part of the state with its lengths, which were in design units, in others.
+
+    Args:
+        part: A part whose fields declare lengths, a pose, or a length itself or several.
+        before: Unit of the page while design units were those of the part.
+        after: The same unit of the page with the new design units.
+        power: Exponent of length of a number.
+    """
+    value: Any = part
+    if before.factor == after.factor:
+        return part
+    if is_dataclass(value):
+        changes = {
+            field.name: in_unit(getattr(value, field.name), before, after, field.metadata["power"])
+            for field in fields(value)
+            if "power" in field.metadata
+        }
+        return cast("Whole", replace(cast("Any", value), **changes))
+    if isinstance(value, Pose):
+        position = in_unit(value.position, before, after)
+        return cast("Whole", Pose(position, value.quaternion))
+    if isinstance(value, tuple):
+        entries = cast("tuple[object, ...]", value)
+        return cast("Whole", tuple(in_unit(entry, before, after, power) for entry in entries))
+    if isinstance(value, float):
+        return cast("Whole", after.to_power(power).read(before.to_power(power).convert(value)))
+    return part
 
 
 def value_at(whole: object, path: str) -> Any:

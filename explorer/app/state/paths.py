@@ -8,14 +8,14 @@ made for; with another design there is none.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Annotated, Literal, TypeAlias
 
 import msgspec
 import numpy as np
 
-from explorer.app.state.parts import TRANSIENT
+from explorer.app.state.parts import LENGTHS, TRANSIENT
 from explorer.errors import InputError
 from explorer.legs.moves import StraightMoves, poses_between
 from explorer.mechanism.design import Design
@@ -126,8 +126,8 @@ class Paths:
         InputError: A time for planning or for the path that is not above zero.
     """
 
-    start: End = None
-    goal: End = None
+    start: End = field(default=None, metadata=LENGTHS)
+    goal: End = field(default=None, metadata=LENGTHS)
     kind: PathKind = "straight"
     seconds: float = DEFAULT_SECONDS
     holds_load: bool = False
@@ -144,6 +144,10 @@ class Paths:
                 raise InputError(
                     f"{what} needs a time above zero; got {format_number(seconds)} seconds"
                 )
+
+    def without_path(self) -> Paths:
+        """Return what stays when another design is opened: the settings of the next path."""
+        return replace(self, planning=None, problem=None, journey=None)
 
     @property
     def is_planning(self) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.app.state.compared import Compared
-from explorer.app.state.parts import STAYS, TRANSIENT, FeaturePart
+from explorer.app.state.parts import LENGTHS, STAYS, TRANSIENT, FeaturePart, in_unit
 from explorer.app.state.paths import Journey, Mode, Paths
 from explorer.app.state.presses import Press
 from explorer.app.state.view import View
@@ -159,18 +159,25 @@ class State:
     mode: Mode
     hold: Hold = field(default="pose", metadata=STAYS)
     unclosed: Unclosed | None = None
-    view: View = field(default_factory=View, metadata=STAYS)
+    view: View = field(default_factory=View, metadata={**STAYS, **LENGTHS})
     taken: tuple[Joints, str] | None = field(default=None, compare=False, metadata=TRANSIENT)
     gesture: Gesture | None = field(default=None, metadata=TRANSIENT)
-    paths: Paths = field(default_factory=Paths)
+    paths: Paths = field(
+        default_factory=Paths, metadata={"on_open": methodcaller("without_path"), **LENGTHS}
+    )
     optimisation: OptimisationPart = field(
-        default_factory=OptimisationPart.new, metadata={"on_open": methodcaller("without_run")}
+        default_factory=OptimisationPart.new,
+        metadata={"on_open": methodcaller("without_run"), **LENGTHS},
     )
     compared: Compared = field(default_factory=Compared, metadata=STAYS)
     studies: StudiesPart = field(default_factory=StudiesPart.new, metadata=STAYS)
     set_tilt_torsion: tilts.TiltTorsion | None = None
     set_tool_angles: Triple | None = None
     set_folds: GivenFolds | None = None
+
+    def in_unit_of(self, design: Design) -> State:
+        """Return the state with its `LENGTHS` in the unit of a design, as the page shows them."""
+        return in_unit(self, self.unit, self.view.unit_for(design))
 
     def for_file(self) -> State:
         """Return the state as a file holds it: while a run goes on, the state before the run."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from explorer.app.state.parts import LENGTHS
 from explorer.errors import InputError
 from explorer.measures.box import PositionSet
 from explorer.mechanism.configuration import Point
@@ -48,9 +49,9 @@ class WorkspaceView:
         "plain", "margin", "condition", "share", "force", "bending", "error", "deflection"
     ] = "plain"
     cut: Literal["x", "y", "z"] | None = None
-    level: float | None = None
+    level: float | None = field(default=None, metadata=LENGTHS)
     flipped: bool = False
-    tolerance: float | None = None
+    tolerance: float | None = field(default=None, metadata=LENGTHS)
 
 
 @dataclass(frozen=True)
@@ -245,9 +246,9 @@ class View:
     swept: bool = False
     radius_curve: bool = False
     ghosts: bool = False
-    warn_below: float | None = None
+    warn_below: float | None = field(default=None, metadata=LENGTHS)
     prototype: PrototypeView = field(default_factory=PrototypeView)
-    workspace: WorkspaceView = field(default_factory=WorkspaceView)
+    workspace: WorkspaceView = field(default_factory=WorkspaceView, metadata=LENGTHS)
     orientation: OrientationView = field(default_factory=OrientationView)
     singular: SingularView = field(default_factory=SingularView)
     forces: ForcesView = field(default_factory=ForcesView)

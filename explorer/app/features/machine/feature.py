@@ -18,6 +18,7 @@ from explorer.app.inputs.controls import At, Bound, item
 from explorer.app.inputs.ranges import Span, platform_span
 from explorer.app.state.actions import FULL_TURN, Action, Set, check_free
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import ClearMachine
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Updates
@@ -78,6 +79,11 @@ class MachinePanel:
         gui = services.gui
         self._controls = controls = MachineControls(gui, services.session)
         self._summary = gui.add_html("")
+        controls.button(
+            "Ideal machine",
+            "Take tool, payload, actuators, struts, guide, tolerances and radii of the legs away.",
+            ClearMachine,
+        )
         with controls.folder("Tool on the platform ({unit}, degrees)"):
             self._add_point("tool", "the tool point", "design.tool.position")
             for axis, (name, about, edge) in enumerate(ANGLES):

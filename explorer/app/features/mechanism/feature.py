@@ -30,6 +30,7 @@ from explorer.app.inputs.ranges import Intervals, Span
 from explorer.app.state import actions
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import OpenPreset, SetUnit, preset_of
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import Hold, State
 from explorer.app.state.view import LengthName
@@ -215,11 +216,12 @@ class DesignPanel:
         with gui.add_folder("Design"):
             controls.dropdown(
                 "Preset",
-                "Open one of the designs of the paper's Table 1, in its home pose.",
+                "Open one of the designs of the paper's Table 1, in its home pose. The machine, "
+                "the radii of the legs, and what is asked and shown stay.",
                 (*PRESETS, NO_OPTION),
                 Bound(
-                    _preset_name,
-                    lambda state, name: actions.Open(PRESETS.get(name, state.design)),
+                    lambda frame: preset_of(frame.state.design) or NO_OPTION,
+                    lambda state, name: OpenPreset(PRESETS.get(name, state.design)),
                 ),
             )
             controls.dropdown(
@@ -249,8 +251,9 @@ class DesignPanel:
                 )
             controls.number(
                 "1 unit (mm)",
-                "Millimetres in one design unit; exports use it.",
-                "design.unit_mm",
+                "Millimetres in one design unit: variables, limits and home grow with it. The "
+                "machine, the radii of the legs, and what is asked keep their millimetres.",
+                Bound(lambda frame: frame.state.design.unit_mm, lambda _, mm: SetUnit(mm)),
                 least=1e-6,
                 step=0.001,
             )
@@ -302,11 +305,6 @@ class DesignPanel:
             power=int(not entry.is_angle),
             disabled=lambda state: limit.switch is not None and limit.value(state.design) is None,
         )
-
-
-def _preset_name(frame: Frame) -> str:
-    name = frame.state.design.name
-    return name if PRESETS.get(name) == frame.state.design else NO_OPTION
 
 
 def limits_figure(frame: Frame) -> str:

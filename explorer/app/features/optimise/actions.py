@@ -14,6 +14,7 @@ import msgspec
 from explorer.app.features.optimise.state import PLACE, Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, problem_of
 from explorer.app.state.actions import Action, Open, Set, check_free, move_to
+from explorer.app.state.geometry import with_machine
 from explorer.app.state.parts import parts_kept_on_open, with_value
 from explorer.app.state.state import State
 from explorer.errors import InputError, NoAnswerError
@@ -84,7 +85,10 @@ class TakePaperProblem(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; refuse while the design is being optimised."""
-        after = Open(defaults.paper_start()).apply(state)
+        start = defaults.paper_start()
+        # The paper's legs are lines.
+        design = with_machine(start, state.design, state.view)
+        after = Open(design.with_limits(leg_radii=start.limits.leg_radii)).apply(state)
         return with_value(after, "optimisation.request", PAPER_REQUEST)
 
 
@@ -230,7 +234,9 @@ def _running(state: State, number: int) -> SearchRun | None:
 
 def _restore_own(state: State, own: State) -> State:
     """Return the user's own state with the present view."""
-    return replace(own, **parts_kept_on_open(state) | {"optimisation": state.optimisation})
+    present = state.in_unit_of(own.design)
+    others = {"optimisation": present.optimisation, "paths": own.paths}
+    return replace(own, **parts_kept_on_open(present) | others)
 
 
 def _with_design(state: State, design: Design) -> State:

@@ -26,6 +26,7 @@ from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import add_lines
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import preset_of
 from explorer.app.state.state import State
 from explorer.app.widgets import charts
 from explorer.app.widgets.assigning import Update
@@ -33,7 +34,6 @@ from explorer.app.widgets.buttons import activity, open_button
 from explorer.measures.box import corners_of
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
-from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
@@ -325,7 +325,7 @@ def search_chip(frame: Frame) -> str:
     if notice is not None:
         buttons = "".join(button(name, state, is_main=name == ACCEPT) for name in notice.buttons)
         return activity(TAB, notice.title, notice.text, notice.share, buttons)
-    if Optimisation.of(state).run is None and state.design in PRESETS.values():
+    if Optimisation.of(state).run is None and preset_of(state.design) is not None:
         paper, look = BUTTONS[PAPER], "ex-tool ex-outlined"
         return open_button(TAB, paper.label, press=PAPER, hint=paper.hint, class_name=look)
     return ""

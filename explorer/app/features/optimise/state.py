@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from explorer.app.state.parts import TRANSIENT
+from explorer.app.state.parts import LENGTHS, TRANSIENT, VOLUME
 from explorer.app.state.state import OptimisationPart, State
 from explorer.errors import InputError
 from explorer.measures.catalogue import Measurements
@@ -47,16 +47,16 @@ class OptimisationRequest:
     """
 
     objective: problems.ObjectiveName = "match-volume"
-    volume: float | None = None
-    reach: float | None = None
-    clearance: float = 0.0
+    volume: float | None = field(default=None, metadata=VOLUME)
+    reach: float | None = field(default=None, metadata=LENGTHS)
+    clearance: float = field(default=0.0, metadata=LENGTHS)
     free: tuple[str, ...] = VARIABLES
     starts: int = 1
     with_box: bool = False
-    box: problems.Box | None = None
+    box: problems.Box | None = field(default=None, metadata=LENGTHS)
     held: bool = False
-    error: float = 0.0
-    deflection: float = 0.0
+    error: float = field(default=0.0, metadata=LENGTHS)
+    deflection: float = field(default=0.0, metadata=LENGTHS)
     acceleration: float = 0.0
     tilt: float = 0.0
 
@@ -175,7 +175,7 @@ class Optimisation(OptimisationPart):
         count: Number of runs so far.
     """
 
-    request: OptimisationRequest = field(default_factory=OptimisationRequest)
+    request: OptimisationRequest = field(default_factory=OptimisationRequest, metadata=LENGTHS)
     run: SearchRun | None = None
     count: Count = 0
 

@@ -1,0 +1,107 @@
+"""The geometry of a design, which may be chosen anew, and the machine around it, which then stays.
+
+| part of the state | by a preset | by another unit | by a file, or a saved design |
+|---|---|---|---|
+| geometry: all other fields of the design | the preset's | grows with it | the file's |
+| machine: `MACHINE`, and the radii of the legs | stays | stays | the file's |
+| what is asked and shown: see `LENGTHS` | stays | stays | stays |
+
+A length that stays keeps its value in the unit that the page shows, millimetres or design units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import msgspec
+
+from explorer.app.state.actions import Action, Open, check_free
+from explorer.app.state.parts import in_unit
+from explorer.app.state.state import State
+from explorer.app.state.view import View
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
+from explorer.numerics.number_text import format_number
+
+MACHINE = ("tool", "payload", "gravity", "actuators", "struts", "guide", "tolerances")
+"""The fields of a design that are its machine; the radii of the legs are among its limits."""
+
+
+def with_machine(design: Design, of: Design, view: View) -> Design:
+    """Return a design with the machine of another one, whose lengths stay in the unit of a view.
+
+    Raises:
+        DesignError: The tool or the payload lies too far from b4 for the design.
+    """
+    units = view.unit_for(of), view.unit_for(design)
+    position, centre = in_unit((of.tool.position, of.payload.centre), *units)
+    machine: dict[str, Any] = {name: getattr(of, name) for name in MACHINE}
+    machine["tool"] = msgspec.structs.replace(of.tool, position=position)
+    machine["payload"] = msgspec.structs.replace(of.payload, centre=centre)
+    radii = in_unit(of.limits.leg_radii, *units)
+    limits = msgspec.structs.replace(design.limits, leg_radii=radii)
+    return msgspec.structs.replace(design, limits=limits, **machine)
+
+
+def without_machine(design: Design) -> Design:
+    """Return a design with an ideal machine: no payload, no limit, no error, and legs as lines."""
+    ideal = Design(a3=design.a3, b1=design.b1, b2=design.b2, b3=design.b3)
+    return with_machine(design, ideal, View())
+
+
+def preset_of(design: Design) -> str | None:
+    """Return the name of the preset whose geometry and name a design has; None if it has none."""
+    preset = PRESETS.get(design.name)
+    return design.name if preset == without_machine(design) else None
+
+
+@dataclass(frozen=True)
+class OpenPreset(Open):
+    """Open a design, in its home pose, with the machine of the present one."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: The design is being optimised, or is too small for the tool or the payload.
+        """
+        return Open(with_machine(self.design, state.design, state.view)).apply(state)
+
+
+@dataclass(frozen=True)
+class SetUnit(Action):
+    """Set the millimetres in one design unit; the machine, and what was asked, stay."""
+
+    template: ClassVar[str] = "1 unit = {action.text} mm"
+
+    unit_mm: float
+
+    @property
+    def text(self) -> str:
+        """The number in words."""
+        return format_number(self.unit_mm, 6)
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: No positive number, one for which a length is too large or too small, or the
+                design is being optimised.
+        """
+        check_free(state)
+        scaled = msgspec.structs.replace(state.design, unit_mm=self.unit_mm)
+        design = with_machine(scaled, state.design, state.view)
+        return replace(state.in_unit_of(design), design=design)
+
+
+@dataclass(frozen=True)
+class ClearMachine(Action):
+    """Take the machine away."""
+
+    template: ClassVar[str] = "Ideal machine"
+
+    def apply(self, state: State) -> State:
+        """Return the next state; refuse while the design is being optimised."""
+        check_free(state)
+        return replace(state, design=without_machine(state.design))
