@@ -35,8 +35,6 @@ from explorer.workspace.limits.valid_poses import violations
 BEYOND = 1.0 + 1e-6
 # Share of a limit from which it binds.
 BINDING = 1.0 - 1e-3
-# Intervals whose motion is computed at once; a path of many moves needs much memory otherwise.
-AT_ONCE = 20_000
 # Parts of an interval, and their weights in its mean by Simpson's rule.
 PARTS, WEIGHTS = (0.0, 0.5, 1.0), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
@@ -154,13 +152,12 @@ class Drives(ActuatorMotion):
     @staticmethod
     def along(design: Design, law: TimeLaw, bodies: MovingBodies) -> Drives:
         """Return what a time law asks of the actuators; arguments and errors as in `of`."""
-        intervals = np.arange(len(law.speed))
+        # One part after the other, because a path of many moves has a million intervals.
         found = [
-            ActuatorMotion.of(design, law, law.within_intervals(PARTS, index), bodies)
-            for index in np.array_split(intervals, 1 + len(intervals) // AT_ONCE)
+            ActuatorMotion.of(design, law, law.within_intervals([part]), bodies) for part in PARTS
         ]
         time, speed, acceleration, force = (
-            np.concatenate(each)
+            np.stack(each, axis=1).reshape(-1, *each[0].shape[1:])
             for each in zip(
                 *((m.time, m.speed, m.acceleration, m.force) for m in found), strict=True
             )

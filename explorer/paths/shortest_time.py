@@ -77,9 +77,7 @@ class Bounds(NamedTuple):
                 f"{JOINTS[int(place[-1])]} needs {force:.4g} N, and its limit is "
                 f"{force / used[place]:.4g} N"
             )
-        slope, curvature = (
-            each(number, share)[..., :PLATFORM] for each in (travel.slopes, travel.curvatures)
-        )
+        slope, curvature = (each[:, :PLATFORM] for each in travel.derivatives(number, share))
         even = np.broadcast_to(acceleration, slope.shape)
         most = np.concatenate([even, push - at_rest, even, pull + at_rest], axis=-1)
         a = np.concatenate([slope, with_u - at_rest], axis=-1)
@@ -105,7 +103,11 @@ def law_of_shortest_time(design: Design, moves: StraightMoves, bodies: MovingBod
     number, share = travel.grid(FEWEST_INTERVALS)
     of_moves = np.split(np.arange(len(number)), np.flatnonzero(np.diff(number)) + 1)
     laws = [_law_of_move(travel, number[part], share[part], bodies) for part in of_moves]
-    return TimeLaw.sequence(laws)
+    number, leader, share, speed, acceleration = map(
+        np.concatenate,
+        zip(*((*law.intervals, law.speed, law.acceleration) for law in laws), strict=True),
+    )
+    return TimeLaw(travel, Intervals(number, leader, share), speed, acceleration)
 
 
 def _law_of_move(
@@ -120,8 +122,8 @@ def _law_of_move(
             "actuators.acceleration_mm_s2, or actuators.push_n and masses to move; or choose a "
             "duration"
         )
-    leader = np.full(len(number) - 1, PLATFORM)
-    intervals = Intervals(number[1:], leader, np.stack([share[:-1], share[1:]], axis=1))
+    intervals = Intervals.between(number, np.full(len(number), PLATFORM), share)
+    intervals = intervals.select(np.arange(len(number) - 1))
     speeds = travel.of_platform(number) * _fastest_rates(share, bounds)
     speed = np.stack([speeds[:-1], speeds[1:]], axis=1)
     acceleration = np.diff(speeds**2) / (2.0 * travel.ways(intervals))

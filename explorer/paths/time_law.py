@@ -31,9 +31,9 @@ INTERVALS, FEWEST_INTERVALS, MOST_INTERVALS = 200, 24, 1000
 # The platform as a leader, after the six joints, and its travel over a move, as a share of the
 # move's length. It leads where all actuators are nearly at rest, as in some singular poses.
 PLATFORM, PLATFORM_TRAVEL = 6, 1e-6
-# Share of its speed by which an actuator may be faster than the leader, and most rounds in which
-# intervals are divided where the leader changes.
-AS_FAST, ROUNDS = 1e-6, 10
+# Halvings of intervals in which the leader changes, and the share of its speed by which another one
+# has to be faster.
+HALVINGS, FASTER = 28, 1e-11
 # Tolerance of roots over the way of the leader, and the way, over the value of its joint, below
 # which the tolerance is no smaller, because the value is rounded.
 ROOT_ERROR, SHORT_WAY = 1e-10, 1e-5
@@ -73,6 +73,12 @@ class Intervals(NamedTuple):
     leader: IntArray
     share: FloatArray
 
+    @staticmethod
+    def between(number: IntArray, leader: IntArray, share: FloatArray) -> Intervals:
+        """Return the intervals from points of moves, (n,) each, to the next; the last have none."""
+        last = np.maximum(share, np.append(share[1:], 0.0))
+        return Intervals(number, leader, np.stack([share, last], axis=1))
+
     def select(self, index: IntArray | BoolArray) -> Intervals:
         """Return the intervals at an index (k,), or where it is true."""
         return Intervals(self.number[index], self.leader[index], self.share[index])
@@ -84,17 +90,14 @@ class Travel(NamedTuple):
     design: Design
     moves: StraightMoves
 
-    def slopes(self, number: IntArray, share: FloatArray) -> FloatArray:
-        """Return the derivatives of these seven by the share of moves by number, (..., 7)."""
+    def derivatives(self, number: IntArray, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return first and second derivatives of these seven by the share of moves, (n, 7) each."""
         p, r = self.moves.poses(number, share)
-        rates = joint_rates(self.design, p, r, self.moves.slopes(number, r)[0])
-        return np.concatenate([rates, self.of_platform(number)[..., None]], axis=-1)
-
-    def curvatures(self, number: IntArray, share: FloatArray) -> FloatArray:
-        """Return the second derivatives of these seven by the share, shape (..., 7)."""
-        p, r = self.moves.poses(number, share)
-        changes = joint_accelerations(self.design, p, r, *self.moves.slopes(number, r))
-        return np.concatenate([changes, np.zeros((*share.shape, 1))], axis=-1)
+        twist, bend = self.moves.slopes(number, r)
+        platform = self.of_platform(number)[:, None]
+        slopes = joint_rates(self.design, p, r, twist), platform
+        curvatures = joint_accelerations(self.design, p, r, twist, bend), 0.0 * platform
+        return np.concatenate(slopes, axis=1), np.concatenate(curvatures, axis=1)
 
     def of_platform(self, number: IntArray) -> FloatArray:
         """Return the travel of the platform over moves by number (...), of the same shape."""
@@ -120,10 +123,9 @@ class Travel(NamedTuple):
 
     def _led(self, intervals: Intervals, share: FloatArray) -> FloatArray:
         """Return the travel of the leaders at shares of their moves, shape (n,)."""
-        number, leader, _ = intervals
-        joints = inverse(self.design, *self.moves.poses(number, share))
-        travel = np.concatenate([joints, (self.of_platform(number) * share)[:, None]], axis=1)
-        return _pick(travel, leader)
+        joints = inverse(self.design, *self.moves.poses(intervals.number, share))
+        platform = (self.of_platform(intervals.number) * share)[:, None]
+        return _pick(np.concatenate([joints, platform], axis=1), intervals.leader)
 
     def grid(self, fewest: int) -> tuple[IntArray, FloatArray]:
         """Return number and share of grid points of all moves with a length, shape (n,) each.
@@ -147,56 +149,33 @@ class Travel(NamedTuple):
         even = [np.linspace(0.0, 1.0, count + 1, dtype=np.float64) for count in counts]
         return np.repeat(moving, counts + 1), np.sin(0.5 * math.pi * np.concatenate(even)) ** 2
 
-    def intervals(self) -> Intervals:
-        """Return intervals of all moves whose leaders are the fastest of the seven all along.
-
-        Errors are those of `grid`.
-        """
+    def led_intervals(self) -> Intervals:
+        """Return intervals of a grid, each led by the fastest of the seven; errors are its own."""
         number, share = self.grid(FEWEST_INTERVALS)
-        found = self._between(number, share)
-        for _ in range(ROUNDS):
-            changes, at = self._changes_of_leader(found)
-            if not len(at):
-                break
-            number, share = np.append(number, changes), np.append(share, at)
-            order = np.lexsort((share, number))
-            number, share = number[order], share[order]
-            found = self._between(number, share)
-        found = found._replace(leader=found.leader % (PLATFORM + 1))
-        return found.select(self.ways(found) > 0.0)
+        leader, is_needed = self._fastest(number, share), np.ones(len(number), dtype=np.bool_)
+        for _ in range(HALVINGS):
+            at = np.flatnonzero((number[1:] == number[:-1]) & (leader[1:] != leader[:-1]))
+            of, middle = number[at], 0.5 * (share[at] + share[at + 1])
+            leader = np.insert(leader, at + 1, self._fastest(of, middle))
+            number, share = np.insert(number, at + 1, of), np.insert(share, at + 1, middle)
+            is_needed = np.insert(is_needed, at + 1, False)
+        # Of the points between those of the grid only those at which the leader changes.
+        is_needed[1:] |= leader[1:] != leader[:-1]
+        return Intervals.between(
+            number[is_needed], leader[is_needed] % (PLATFORM + 1), share[is_needed]
+        )
 
-    def _between(self, number: IntArray, share: FloatArray) -> Intervals:
-        """Return the intervals between grid points, led by the fastest in the middle of each."""
-        starts = np.flatnonzero(number[1:] == number[:-1])
-        ends, number = share[np.stack([starts, starts + 1], axis=1)], number[starts]
-        leader: IntArray = self._speeds(number, ends.mean(axis=1)).argmax(axis=1)
-        return Intervals(number, leader, ends)
-
-    def _changes_of_leader(self, intervals: Intervals) -> tuple[IntArray, FloatArray]:
-        """Return moves and shares where another one becomes as fast as the leader, (k,) each."""
-        number, leader = (np.repeat(each[:, None], 2, axis=1) for each in intervals[:2])
-        speeds = self._speeds(number, intervals.share)
-        row, end = np.nonzero((1.0 + AS_FAST) * _pick(speeds, leader) < speeds.max(axis=2))
-        before, after, of = leader[row, end], speeds.argmax(axis=2)[row, end], number[row, end]
-        middle = intervals.share[row].mean(axis=1)
-        span = intervals.share[row, end] - middle
-
-        def lead(at: FloatArray) -> FloatArray:
-            speeds = self._speeds(of, middle + at * span)
-            return (_pick(speeds, after) - _pick(speeds, before)) / speeds.max(axis=1)
-
-        ends = lead(np.zeros(len(of))), lead(np.ones(len(of)))
-        return of, middle + span * find_roots(lead, *ends, ROOT_ERROR)
-
-    def _speeds(self, number: IntArray, share: FloatArray) -> FloatArray:
-        """Return the slopes and then those of the joints in the other sense, shape (..., 13)."""
-        slopes = self.slopes(number, share)
-        return np.concatenate([slopes, -slopes[..., :PLATFORM]], axis=-1)
+    def _fastest(self, number: IntArray, share: FloatArray) -> IntArray:
+        """Return the index of the fastest, with 7 more for a joint whose value falls, (n,)."""
+        slopes, _ = self.derivatives(number, share)
+        speeds = np.concatenate([slopes, -slopes[:, :PLATFORM]], axis=1)
+        # Of those that are equally fast, as d1 and d3 without a turn, the first.
+        return np.argmax(speeds > (1.0 - FASTER) * speeds.max(axis=1)[:, None], axis=1)
 
 
 def _pick(values: FloatArray, index: IntArray) -> FloatArray:
-    """Return values (..., k) by index, shape (...)."""
-    return np.take_along_axis(values, index[..., None], axis=-1)[..., 0]
+    """Return values (n, k) by index, shape (n,)."""
+    return np.take_along_axis(values, index[:, None], axis=1)[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,18 +194,6 @@ class TimeLaw:
     intervals: Intervals
     speed: FloatArray
     acceleration: FloatArray
-
-    @staticmethod
-    def sequence(laws: Sequence[TimeLaw]) -> TimeLaw:
-        """Return laws of moves of one path, one after the other."""
-        number, leader, share = map(
-            np.concatenate, zip(*(law.intervals for law in laws), strict=True)
-        )
-        speed, acceleration = (
-            np.concatenate(each)
-            for each in zip(*((law.speed, law.acceleration) for law in laws), strict=True)
-        )
-        return TimeLaw(laws[0].travel, Intervals(number, leader, share), speed, acceleration)
 
     @cached_property
     def steps(self) -> FloatArray:
@@ -260,14 +227,13 @@ class TimeLaw:
         part = np.clip((time - self.time[index]) / self.steps[index], 0.0, 1.0)
         return self._motion(index, part)
 
-    def within_intervals(self, parts: Sequence[float], index: IntArray | None = None) -> Motion:
-        """Return the motion after parts, from 0 to 1, of the time of intervals, all in turn.
+    def within_intervals(self, parts: Sequence[float]) -> Motion:
+        """Return the motion after parts, from 0 to 1, of the time of each interval, all in turn.
 
-        At the ends of an interval, where accelerations jump, it is the motion within it. An index
-        chooses intervals, None all.
+        At the ends of an interval, where accelerations jump, it is the motion within it.
         """
-        index = np.arange(len(self.speed)) if index is None else index
-        return self._motion(np.repeat(index, len(parts)), np.tile(np.array(parts), len(index)))
+        index = np.repeat(np.arange(len(self.speed)), len(parts))
+        return self._motion(index, np.tile(np.array(parts), len(self.speed)))
 
     def _motion(self, index: IntArray, part: FloatArray) -> Motion:
         """Return the motion after parts of the time of intervals by index, shape (n,) each."""
@@ -275,9 +241,7 @@ class TimeLaw:
         led, (start, end) = self.intervals.select(index), self.speed[index].T
         speed = start + part * (end - start)
         share = self.travel.shares_after(led, part * (start + speed) / (start + end))
-        slopes, curvatures = (
-            each(led.number, share) for each in (self.travel.slopes, self.travel.curvatures)
-        )
+        slopes, curvatures = self.travel.derivatives(led.number, share)
         slope, curvature = (_pick(each, led.leader) for each in (slopes, curvatures))
         rate = speed / np.abs(slope)
         change = (self.acceleration[index] - np.sign(slope) * curvature * rate**2) / np.abs(slope)
@@ -306,30 +270,28 @@ def law_at_speed(
             f"speed and acceleration must be above zero; got {speed:g} and {acceleration:g}"
         )
     travel = Travel(design, moves)
-    led = travel.intervals()
-    # Travel since the start of the path: at the ends of intervals, of moves, and of ramps.
-    ways = travel.ways(led)
-    gone = np.append(0.0, np.cumsum(ways))
-    starts = np.flatnonzero(np.diff(led.number, prepend=-1))
-    begin, end = gone[starts], gone[np.append(starts[1:], len(led.number))]
-    ramp = np.minimum(0.5 * speed**2 / acceleration, 0.5 * (end - begin))
-    cuts = np.stack([begin + ramp, end - ramp], axis=1).ravel()
-    index = np.clip(np.searchsorted(gone, cuts, "right") - 1, 0, len(led.number) - 1)
-    part = np.clip((cuts - gone[index]) / ways[index], 0.0, 1.0)
-    at = travel.shares_after(led.select(index), part)
-    # Divide the intervals in which a ramp ends.
-    number, leader = (np.insert(each, index + 1, each[index]) for each in led[:2])
-    first, gone = np.insert(led.share[:, 0], index + 1, at), np.insert(gone, index + 1, cuts)
-    last = np.where(np.diff(number, append=-1) == 0, np.append(first[1:], 1.0), 1.0)
-    move = np.searchsorted(led.number[starts], number)
-    # Travel to the nearer end of the move, from both ends of each interval.
-    gone = np.stack([gone[:-1], gone[1:]], axis=1)
-    rest = np.minimum(gone - begin[move, None], end[move, None] - gone)
-    change = np.where(rest.mean(axis=1) < ramp[move], np.sign(np.diff(rest)[:, 0]), 0.0)
-    speeds = np.full(rest.shape, speed)
+    led = travel.led_intervals()
+    speeds, change = np.full(led.share.shape, speed), np.zeros(len(led.number))
     if math.isfinite(acceleration):
+        # Travel since the start of the path: at the ends of intervals, of moves, and of ramps.
+        ways = travel.ways(led)
+        gone = np.append(0.0, np.cumsum(ways))
+        starts = np.flatnonzero(np.diff(led.number, prepend=-1))
+        begin, end = gone[starts], np.append(gone[starts[1:]], gone[-1])
+        ramp = np.minimum(0.5 * speed**2 / acceleration, 0.5 * (end - begin))
+        cuts = np.stack([begin + ramp, end - ramp], axis=1).ravel()
+        index = np.searchsorted(gone, cuts, "right") - 1
+        at = travel.shares_after(led.select(index), (cuts - gone[index]) / ways[index])
+        # Divide the intervals in which a ramp ends.
+        number, leader = (np.insert(each, index + 1, each[index]) for each in led[:2])
+        first, gone = np.insert(led.share[:, 0], index + 1, at), np.insert(gone, index + 1, cuts)
+        led = Intervals.between(number, leader, first)
+        move = np.unique(number, return_inverse=True)[1]
+        # Travel to the nearer end of the move, from both ends of each interval.
+        gone = np.stack([gone[:-1], gone[1:]], axis=1)
+        rest = np.minimum(gone - begin[move, None], end[move, None] - gone)
         speeds = np.sqrt(np.clip(2.0 * acceleration * rest, 0.0, speed**2))
-        change = acceleration * change
-    led = Intervals(number, leader, np.stack([first, last], axis=1))
+        ramps = rest.mean(axis=1) < ramp[move]
+        change = acceleration * np.where(ramps, np.sign(np.diff(rest)[:, 0]), 0.0)
     takes_time = (travel.ways(led) > 0.0) & (speeds.sum(axis=1) > 0.0)
     return TimeLaw(travel, led.select(takes_time), speeds[takes_time], change[takes_time])
