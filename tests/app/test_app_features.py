@@ -31,7 +31,6 @@ from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Advance as PlayOn, SetEnd, SetPathTime, TakePlan
-from explorer.app.features.prototype.building import MakeFit
 from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
@@ -45,7 +44,6 @@ from explorer.app.session.history import UserAction
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import (
     MarkSaved,
-    Open,
     Set,
     SetAngle,
     SetJoint,
@@ -57,7 +55,6 @@ from explorer.app.state.actions import (
 )
 from explorer.app.state.folds import SetFold
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetUnit
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.view import OrientationView
 from explorer.app.storage.user_data import open_user_data
@@ -265,7 +262,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
-    SetFold, SetVariable, SetName, SetUnit, SetPathTime, SetEnd, PickDesign, Open, OpenSession,
+    SetFold, SetVariable, SetName, SetPathTime, SetEnd, PickDesign, OpenSession,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map, a handle or a file gives."""
 
@@ -278,10 +275,7 @@ OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")} |
 }
 """Commands that change the camera, the panels or the clipboard of one browser: none is there."""
 
-WHERE_IT_IS_SHOWN = {
-    StartThere: "Workspace › Go there",
-    MakeFit: "Prototype › Make the parts fit",
-}
+WHERE_IT_IS_SHOWN = {StartThere: "Workspace › Go there"}
 """Actions of commands that do nothing unless something is shown."""
 
 CONTROL_KEYS = {label: keys for feature in FEATURES for label, keys in feature.keys.items()}

@@ -21,7 +21,7 @@ from explorer.app.features.optimise.work import PAPER_REQUEST
 from explorer.app.session.history import restore, start_history
 from explorer.app.state.actions import Open, Reset, Set, SetVariable
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import ClearMachine, OpenPreset, SetUnit, preset_of
+from explorer.app.state.geometry import ClearMachine, open_geometry, preset_of, set_unit
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.paths import Paths
 from explorer.app.state.state import State, open_state
@@ -92,6 +92,14 @@ def asked() -> State:
     return state
 
 
+def with_unit(state: State, unit_mm: float) -> State:
+    return set_unit(state, unit_mm).apply(state)
+
+
+def with_geometry(state: State, design: Design) -> State:
+    return open_geometry(design, state).apply(state)
+
+
 def millimetres(state: State) -> dict[str, float]:
     """Return the lengths that stay in millimetres, and the volume in mm³, by path."""
     unit = state.design.unit_mm
@@ -123,7 +131,7 @@ def test_presets_and_unit_of_the_page_keep_payload_actuators_and_demands(
 
 
 def test_preset_changes_the_geometry_alone(asked: State) -> None:
-    after = OpenPreset(INITIAL).apply(asked)
+    after = with_geometry(asked, INITIAL)
     assert geometry_of(after.design) == geometry_of(INITIAL)
     assert machine_of(after.design) == machine_of(asked.design)
     assert after.design.limits.leg_radii == asked.design.limits.leg_radii
@@ -137,15 +145,12 @@ def test_preset_changes_the_geometry_alone(asked: State) -> None:
     assert ClearMachine().apply(after).design == INITIAL
 
 
-@pytest.mark.parametrize(
-    "action",
-    [SetUnit(40.0), SetUnit(2.5), OpenPreset(msgspec.structs.replace(INITIAL, unit_mm=40.0))],
-)
+@pytest.mark.parametrize(("unit", "is_preset"), [(40.0, False), (2.5, False), (40.0, True)])
 def test_millimetres_that_were_asked_for_stay_in_another_unit(
-    asked: State, action: SetUnit | OpenPreset
+    asked: State, unit: float, is_preset: bool
 ) -> None:
-    after = action.apply(asked)
-    unit = action.unit_mm if isinstance(action, SetUnit) else 40.0
+    preset = msgspec.structs.replace(INITIAL, unit_mm=unit)
+    after = with_geometry(asked, preset) if is_preset else with_unit(asked, unit)
     assert after.design.unit_mm == unit
     assert millimetres(after) == pytest.approx(millimetres(asked), rel=1e-14)
     for name in ("actuators", "struts", "guide", "tolerances", "gravity"):
@@ -157,16 +162,16 @@ def test_millimetres_that_were_asked_for_stay_in_another_unit(
     # What is shown as 200 mm is 200 again, and not 199.99999999999997.
     text = after.unit.convert(request.box[1][0]) if request.box else 0.0
     assert text == 150.0
-    if isinstance(action, SetUnit):
+    if not is_preset:
         assert after.design.variables == asked.design.variables
         assert after.design.limits.box == asked.design.limits.box
         assert (after.pose, after.joints, after.base) == (asked.pose, asked.joints, asked.base)
-        assert SetUnit(asked.design.unit_mm).apply(after) == asked
+        assert with_unit(after, asked.design.unit_mm) == asked
 
 
 def test_design_units_that_were_asked_for_stay_where_the_page_shows_them(asked: State) -> None:
     shown = Set("view.lengths", "design units").apply(asked)
-    after = SetUnit(40.0).apply(shown)
+    after = with_unit(shown, 40.0)
     assert after == replace(shown, design=msgspec.structs.replace(shown.design, unit_mm=40.0))
 
 
@@ -177,12 +182,12 @@ def test_file_brings_its_machine_and_what_was_asked_stays_in_its_millimetres(ask
     kept = [path for path in LENGTHS if not path.startswith("design")]
     before = millimetres(asked)
     assert [millimetres(after)[path] for path in kept] == pytest.approx([before[p] for p in kept])
-    assert Reset().apply(SetUnit(10.0).apply(after)).design == design
+    assert Reset().apply(with_unit(after, 10.0)).design == design
 
 
 def test_undo_of_another_unit_keeps_what_is_shown(asked: State) -> None:
     history = start_history(asked)
-    present = SetUnit(40.0).apply(asked)
+    present = with_unit(asked, 40.0)
     assert restore(history, present)[0] == asked
 
 
@@ -197,7 +202,7 @@ def test_paper_problem_keeps_the_machine_but_for_the_radii(asked: State) -> None
 def test_tool_too_far_for_a_small_preset_is_refused(asked: State) -> None:
     far = with_value(asked, "design.tool.position.2", 1900.0)
     with pytest.raises(InputError, match="must lie within 100 reaches"):
-        OpenPreset(INITIAL).apply(far)
+        with_geometry(far, INITIAL)
 
 
 def numbers_of(part: Any, path: str) -> Iterator[tuple[str, bool]]:
@@ -236,10 +241,8 @@ def test_every_number_of_view_paths_and_request_is_a_declared_length_or_none() -
 
 
 def test_state_with_everything_in_it_takes_another_unit_and_a_preset() -> None:
-    state = rich_state()
-    for action in (SetUnit(3.0), OpenPreset(INITIAL), ClearMachine()):
-        state = action.apply(state)
-    assert state.design == INITIAL
+    state = with_geometry(with_unit(rich_state(), 3.0), INITIAL)
+    assert ClearMachine().apply(state).design == INITIAL
 
 
 def test_result_that_is_given_up_after_another_unit_leaves_what_was_shown(asked: State) -> None:
@@ -248,7 +251,7 @@ def test_result_that_is_given_up_after_another_unit_leaves_what_was_shown(asked:
     state = StartRun().apply(asked)
     iterates = iterates_of(state, 2)
     end = EndRun(1, SearchResult("converged", "It ended.", iterates[-1]), iterates)
-    other = SetUnit(40.0).apply(end.apply(state))
+    other = with_unit(end.apply(state), 40.0)
     back = Revert().apply(other)
     assert (back.design, back.pose, back.paths) == (asked.design, asked.pose, asked.paths)
     found, expected = millimetres(back), millimetres(asked)

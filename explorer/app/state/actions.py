@@ -345,9 +345,11 @@ class Set(Action):
             InputError: The state refuses the value, or it belongs to a design that is being
                 optimised.
         """
-        if self.at.startswith("design"):
-            check_free(state)
-        return with_value(state, self.at, self.value)
+        if not self.at.startswith("design"):
+            return with_value(state, self.at, self.value)
+        check_free(state)
+        design = with_value(state, self.at, self.value).design
+        return replace(state.in_unit_of(design), design=design)
 
     def words(self) -> str:
         """Return what the action does."""

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from explorer.app.state.actions import Action, Open, check_free
+from explorer.app.state.actions import Action, Open, Set, check_free
 from explorer.app.state.parts import in_unit
 from explorer.app.state.state import State
 from explorer.app.state.view import View
@@ -56,43 +56,16 @@ def preset_of(design: Design) -> str | None:
     return design.name if preset == without_machine(design) else None
 
 
-@dataclass(frozen=True)
-class OpenPreset(Open):
-    """Open a design, in its home pose, with the machine of the present one."""
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The design is being optimised, or is too small for the tool or the payload.
-        """
-        return Open(with_machine(self.design, state.design, state.view)).apply(state)
+def open_geometry(design: Design, state: State) -> Open:
+    """Return the action that opens a design, in its home pose, with the machine of a state."""
+    return Open(with_machine(design, state.design, state.view))
 
 
-@dataclass(frozen=True)
-class SetUnit(Action):
-    """Set the millimetres in one design unit; the machine, and what was asked, stay."""
-
-    template: ClassVar[str] = "1 unit = {action.text} mm"
-
-    unit_mm: float
-
-    @property
-    def text(self) -> str:
-        """The number in words."""
-        return format_number(self.unit_mm, 6)
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: No positive number, one for which a length is too large or too small, or the
-                design is being optimised.
-        """
-        check_free(state)
-        scaled = msgspec.structs.replace(state.design, unit_mm=self.unit_mm)
-        design = with_machine(scaled, state.design, state.view)
-        return replace(state.in_unit_of(design), design=design)
+def set_unit(state: State, unit_mm: float) -> Set:
+    """Return the action that sets the millimetres in one design unit."""
+    scaled = msgspec.structs.replace(state.design, unit_mm=unit_mm)
+    design = with_machine(scaled, state.design, state.view)
+    return Set("design", design, "1 unit", f"{format_number(unit_mm, 6)} mm")
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from explorer.app.session.latest import LatestWins
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, MarkSaved, Open, SetName
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import OpenPreset
+from explorer.app.state.geometry import open_geometry
 from explorer.app.state.view import View
 from explorer.app.storage.library import Entry, copy_name
 from explorer.app.widgets.assigning import Update
@@ -303,7 +303,7 @@ class DesignsPanel:
 
     def _open(self, row: Entry, who: Who) -> None:
         if row.name in PRESETS:
-            self._session.do(OpenPreset(PRESETS[row.name]), who=who)
+            self._session.do(partial(open_geometry, PRESETS[row.name]), who=who)
         else:
             self._saved.open(row.name, who)
 

@@ -30,7 +30,7 @@ from explorer.app.inputs.ranges import Intervals, Span
 from explorer.app.state import actions
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import OpenPreset, SetUnit, preset_of
+from explorer.app.state.geometry import open_geometry, preset_of, set_unit
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import Hold, State
 from explorer.app.state.view import LengthName
@@ -221,7 +221,7 @@ class DesignPanel:
                 (*PRESETS, NO_OPTION),
                 Bound(
                     lambda frame: preset_of(frame.state.design) or NO_OPTION,
-                    lambda state, name: OpenPreset(PRESETS.get(name, state.design)),
+                    lambda state, name: open_geometry(PRESETS.get(name, state.design), state),
                 ),
             )
             controls.dropdown(
@@ -253,7 +253,7 @@ class DesignPanel:
                 "1 unit (mm)",
                 "Millimetres in one design unit: variables, limits and home grow with it. The "
                 "machine, the radii of the legs, and what is asked keep their millimetres.",
-                Bound(lambda frame: frame.state.design.unit_mm, lambda _, mm: SetUnit(mm)),
+                Bound(lambda frame: frame.state.design.unit_mm, set_unit),
                 least=1e-6,
                 step=0.001,
             )

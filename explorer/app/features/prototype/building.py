@@ -6,18 +6,15 @@ and the bar while it is negative.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import partial
 from html import escape
-from typing import ClassVar, TypeAlias
-
-import msgspec
+from typing import TypeAlias
 
 from explorer.app.features.feature import Services, html_of
 from explorer.app.session.feed import Feed, feed_of
-from explorer.app.state.actions import Action, Set
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetUnit
+from explorer.app.state.geometry import with_machine
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import figure, press_button
 from explorer.app.widgets.markup import row, sentence, status, table
@@ -34,27 +31,6 @@ STROKES_WORDS = "Limit the lengths to the strokes"
 STROKES_HINT = (
     "Set the limits of the lengths to what a rod in its cylinder reaches; the workspace may shrink."
 )
-
-
-@dataclass(frozen=True)
-class MakeFit(Action):
-    """Take unit and home of a design whose parts fit; the radii of the legs grow with the unit.
-
-    Attributes:
-        remedy: The design.
-        title: What it changes.
-    """
-
-    template: ClassVar[str] = "Design: {action.title}"
-
-    remedy: Design
-    title: str
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        after = SetUnit(self.remedy.unit_mm).apply(state)
-        design = after.design.with_limits(leg_radii=self.remedy.limits.leg_radii)
-        return replace(after, design=msgspec.structs.replace(design, home=self.remedy.home))
 
 
 def _request_for(frame: Frame) -> Design | None:
@@ -97,15 +73,19 @@ class BuildVerdict:
         hint = " ".join(map(sentence, clauses))
         return figure("Prototype", "Buildable", words, hint=hint, look="ex-beyond")
 
-    def _mend(self, what: str, state: State) -> Action | None:
+    def _mend(self, what: str, state: State) -> Set | None:
         built = self._feed.drawing
         # What was found for another design would bring that one back.
         if built is None or not self._feed.is_current or self._feed.request != state.design:
             return None
-        if what == FITTING:
-            return None if built.remedy is None else MakeFit(built.remedy, mend_words(built))
-        remedy = built.within_strokes
-        return None if remedy is None else Set("design", remedy, "Design", STROKES_WORDS)
+        remedy = built.remedy if what == FITTING else built.within_strokes
+        words = mend_words(built) if what == FITTING else STROKES_WORDS
+        if remedy is None:
+            return None
+        # The parts fit with radii of the legs that grow with the unit.
+        kept = with_machine(remedy, state.design, state.view)
+        design = kept.with_limits(leg_radii=remedy.limits.leg_radii)
+        return Set("design", design, "Design", words)
 
 
 def mend_words(built: Buildability) -> str:
