@@ -183,6 +183,8 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         struts: Tubes of legs 2 and 3.
         guide: Limits of the guide.
         tolerances: Tolerances of the geometric dimensions.
+        required_box: (lows, highs) of the positions of b4 that a search required of the workspace,
+            where it found them; None for none. It is no limit.
 
     Raises:
         DesignError: A value is not finite or beyond the bounds of
@@ -207,6 +209,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     struts: Struts = Struts()
     guide: Guide = Guide()
     tolerances: Tolerances = Tolerances()
+    required_box: tuple[Triple, Triple] | None = None
 
     def __post_init__(self) -> None:
         if self.schema != 2:
@@ -224,6 +227,8 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         _set(self, "unit_mm", checks.positive("unit_mm", self.unit_mm))
         if self.node_step is not None:
             _set(self, "node_step", checks.positive("node_step", self.node_step))
+        if self.required_box is not None:
+            _set(self, "required_box", checks.box("required_box", self.required_box))
         size = checks.number(
             "the largest design variable", max(map(abs, self.variables)), checks.LEAST
         )

@@ -7,7 +7,7 @@ libraries. All are plain values, to send to another process or write into a file
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -20,9 +20,9 @@ from explorer.files.packaged import versions
 from explorer.files.writing import read_at_most
 from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.mechanism.design import VARIABLES, Design
+from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import ObjectiveName, Problem
+from explorer.optimise.problem import SHIFTS, ObjectiveName, Problem
 
 Status = Literal["converged", "not converged", "infeasible", "stalled", "outdone", "cancelled"]
 """Converged: the design meets all demands and has a workspace, and no design nearby that meets
@@ -246,19 +246,28 @@ def load_record(path: Path) -> Record:
 
 
 def compare_designs(
-    problem: Problem, before: Design, after: Design, values: Sequence[float]
+    problem: Problem, before: Design, after: Design
 ) -> tuple[Measurements, Measurements]:
-    """Return the measures of a design, and of the one with some values of a problem's variables.
+    """Return the measures of a design, and of one that a search for a problem has found.
 
-    Each is measured over the required box where it lies for that design.
+    The required box over which they are measured lies where the search began, and where it ended.
     """
     demands, names = problem.demands, (*measures_in("optimise"), *VARIABLES)
     margin = None if demands.clearance is None else demands.clearance_margin
-    box = demands.required_box
-    first = Case(before, demanded_margin=margin, box=box)
-    shifted = None if box is None else problem.required_box_at(values)
-    second = Case(after, demanded_margin=margin, box=shifted)
+    first = Case(before, demanded_margin=margin, box=demands.required_box)
+    second = Case(after, demanded_margin=margin, box=after.required_box)
     return measure_design(first, names), measure_design(second, names)
+
+
+def box_moves(problem: Problem, values: Sequence[float]) -> Iterator[tuple[str, Pair, Pair]]:
+    """Yield the name of each axis of a required box that may move, and its ends before and after.
+
+    The ends are those at the start, and those to which some values of the variables shift them.
+    """
+    if {*SHIFTS} & {*problem.names}:
+        boxes = (problem.required_box_at(each) for each in (problem.start_values, values))
+        for axis, *ends in zip("xyz", *(zip(*box, strict=True) for box in boxes), strict=True):
+            yield f"required box {axis}", ends[0], ends[1]
 
 
 GOALS: Mapping[ObjectiveName, str] = {

@@ -211,20 +211,19 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return tuple(start_value(self.start, variable.name) for variable in self.variables)
 
     def design_at(self, values: Iterable[float]) -> Design:
-        """Return the design with these values of the variables.
+        """Return the design with these values of the variables, and with the required box there.
 
         Raises:
             DesignError: The values make a degenerate design.
         """
-        design = with_values(self.start, dict(zip(self.names, values, strict=True)))
-        return with_strokes(design, self.demands.stroke_ratio)
+        given = dict(zip(self.names, values, strict=True))
+        design = with_strokes(with_values(self.start, given), self.demands.stroke_ratio)
+        box = self.demands.required_box and self.required_box_at(given.values())
+        unchanged = box == design.required_box
+        return design if unchanged else msgspec.structs.replace(design, required_box=box)
 
     def required_box_at(self, values: Iterable[float]) -> Box:
-        """Return the required box where these values of the variables shift it to.
-
-        Raises:
-            InputError: No box is required.
-        """
+        """Return the required box where these values shift it to; an InputError without one."""
         if self.demands.required_box is None:
             raise InputError("this problem requires no box within the workspace")
         given = dict(zip(self.names, values, strict=True))

@@ -86,8 +86,8 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.box import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
-from explorer.mechanism.design_file import PRESETS
-from explorer.numerics.number_text import UNITS
+from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
+from explorer.numerics.number_text import UNITS, format_number
 from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate, compare_designs, curves_of
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
@@ -107,6 +107,8 @@ MACHINE = msgspec.structs.replace(
 )
 SMALL = OptimisationRequest(volume=8000.0)
 MARGIN = OptimisationRequest(objective="largest-margin")
+MOVE = (0.5, -0.25, 1.0)
+OTHER_BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
 # With so many starts a search goes on until it is ended.
 ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=10_000)
 
@@ -163,6 +165,13 @@ def buttons_of(state: State) -> dict[str, str]:
     return looks
 
 
+def moved_iterate(state: State) -> Iterate:
+    """Return an iterate of a run with the required box moved, where only its place is free."""
+    problem = run_of(state).problem
+    first = iterates_of(state, 1)[0]
+    return msgspec.structs.replace(first, values=MOVE, design=problem.design_at(MOVE))
+
+
 def filled_buttons(state: State) -> list[str]:
     return [name for name, look in buttons_of(state).items() if look == "filled"]
 
@@ -175,7 +184,7 @@ def found() -> State:
     outcome = optimise(run.problem, run.starts, Channel(iterates.append, lambda: False))
     result = result_of(run, outcome, ())
     ended = EndRun(run.number, result, tuple(iterates)).apply(state)
-    both = compare_designs(run.problem, run.own.design, outcome.design, outcome.best.values)
+    both = compare_designs(run.problem, run.own.design, outcome.design)
     return Compare(run.number, both).apply(ended)
 
 
@@ -527,10 +536,46 @@ def test_required_box_is_drawn_where_it_is() -> None:
     assert np.sort(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) == pytest.approx(
         np.sort(np.repeat(sides, 4))
     )
-    shifted = msgspec.structs.replace(iterates_of(state, 1)[0], values=(0.5, -0.25, 1.0))
-    assert np.array(visible_box(end(state, (shifted,)))) == pytest.approx(
-        np.array(box) + shifted.values
-    )
+    moved = np.array(box) + MOVE
+    assert np.array(visible_box(end(state, (moved_iterate(state),)))) == pytest.approx(moved)
+
+
+def test_place_that_a_search_found_is_in_fields_table_and_design_until_it_is_reverted() -> None:
+    before = ask(replace(MARGIN, free=(PLACE,)), own_state())
+    state = StartRun().apply(before)
+    box, run = requested_box(state), run_of(state)
+    best = moved_iterate(state)
+    moved = run.problem.required_box_at(MOVE)
+    ended = end(state, (best,))
+    accepted = Accept().apply(ended)
+    for each in (ended, accepted):
+        assert requested_box(each) == visible_box(each) == each.design.required_box == moved
+        assert decode_design(encode_design(each.design), "it").required_box == moved
+    both = compare_designs(run.problem, run.own.design, best.design)
+    compared = run_of(Compare(run.number, both).apply(accepted))
+    rows = {row[0]: row[1:] for row in rows_of(comparison_table(compared, View()))}
+    for axis, *ends, way in zip("xyz", box[0], moved[0], MOVE, strict=True):
+        cells = [format_number(10.0 * end, 5) for end in (*ends, way)]
+        cells[2] = f"{'+' * (way > 0.0)}{cells[2]}"
+        assert rows[f"required box {axis} from mm"] == cells
+    # A search that goes on from there begins there, and both lead back to the own box.
+    again = StartRun().apply(ended)
+    assert run_of(again).problem.demands.required_box == moved
+    for each in (ended, end(again, (moved_iterate(again),))):
+        reverted = Revert().apply(each)
+        assert requested_box(reverted) == box
+        assert Optimisation.of(reverted).request == Optimisation.of(before).request
+        assert reverted.design == before.design
+    # What the user types meanwhile stays.
+    typed = SetRequest("optimisation.request.box", OTHER_BOX).apply(ended)
+    for action in (Accept(), Revert()):
+        assert requested_box(action.apply(typed)) == OTHER_BOX
+
+
+def test_design_opened_with_a_required_box_suggests_it() -> None:
+    design = msgspec.structs.replace(OPTIMAL, required_box=OTHER_BOX)
+    assert requested_box(open_state(design)) == OTHER_BOX
+    assert complete_request(open_state(design)).box == OTHER_BOX
 
 
 def test_table_shows_old_and_new_and_their_difference(found: State) -> None:

@@ -12,6 +12,7 @@ from command_line import CommandLine
 
 import explorer
 from explorer.cli import INTERRUPTED
+from explorer.cli.output import figure
 from explorer.cli.streams import Meter
 from explorer.optimise.outcome import load_record
 
@@ -189,6 +190,7 @@ def test_optimise_other_objectives_and_variables(cli: CommandLine) -> None:
     )
     assert margin["objective"] == pytest.approx(6.0, abs=1e-6)
     assert set(margin["values"]) == {"a3x", "a3y", "b1x", "b1y", "b2", "b3", "yaw"}
+    assert margin["design"]["required_box"] == [[8.0, 4.0, 6.0], [12.0, 8.0, 10.0]]
     smallest = cli.answer(
         *("--objective", "smallest-reach", "--starts", "2", "--least", "1"),
         *("--bounds", "b1x=-10:10", "b1y=-10:10", "b2=-10:10", "b3=-10:10", "a3y=1:40"),
@@ -200,6 +202,34 @@ def test_optimise_other_objectives_and_variables(cli: CommandLine) -> None:
     stroke = cli.answer("--target-volume", "5000", "--stroke-ratio", "2")
     low, high = stroke["design"]["limits"]["l1"]
     assert (low, high) == (pytest.approx(stroke["reach"] / 2.0), None)
+
+
+def test_optimise_tells_and_writes_where_the_required_box_lies(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    out = tmp_path / "design.json"
+    argv = ["--objective", "largest-margin", "--required-box", "8", "4", "6", "12", "8", "10"]
+    argv += ["--free", "yaw", "shift-x", "shift-z", "--out", str(out)]
+    text = cli.text(*argv)
+    design, record = explorer.load_design(str(out)), load_record(out.with_suffix(".record.json"))
+    values = dict(
+        zip(record.problem.names, record.history[record.runs[0].best].values, strict=True)
+    )
+    shifts = [values["shift-x"], 0.0, values["shift-z"]]
+    assert design.required_box is not None
+    lows, highs = design.required_box
+    for axis, own, low, high, shift in zip(
+        "xyz", (8.0, 4.0, 6.0), lows, highs, shifts, strict=True
+    ):
+        assert (low, high) == pytest.approx((own + shift, own + shift + 4.0))
+        line = next(each for each in text.splitlines() if each.startswith(f"required box {axis}"))
+        assert line.split()[3:6:2] == [figure(own), figure(own + 4.0)]
+        assert line.split()[6:9:2] == [figure(low), figure(high)]
+    # Without a box the next search requires none.
+    again = cli.answer(
+        "--design", str(out), "--target-volume", "5000", "--iterations", "1", status=1
+    )
+    assert again["design"]["required_box"] is None
 
 
 LOADED = ["--force", "10", "--most", "150"]

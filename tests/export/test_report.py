@@ -31,7 +31,7 @@ from explorer.legs.clearance import PAIRS, pair_name
 from explorer.mechanism.design import JOINTS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.numerics.number_text import format_number
-from explorer.optimise.defaults import paper_problem
+from explorer.optimise.defaults import make_problem, paper_problem
 from explorer.optimise.outcome import Record, Settings, record_of
 from explorer.optimise.solver import optimise_design
 from explorer.prototype.assembly import bill_of_materials, make_prototype
@@ -258,6 +258,26 @@ def test_report_search_section_holds_the_record() -> None:
     assert "explorer optimise --repeat record.json" in page.one(id="commands").text
     other = page_of(OPTIMAL, record=record)
     assert "not the one that this search found" in " ".join(other.text.split())
+
+
+def test_report_tells_the_place_of_the_box_and_the_yaw_that_a_search_found() -> None:
+    asked, free = ((8.0, 4.0, 6.0), (12.0, 8.0, 10.0)), ("yaw", "shift-x", "shift-z")
+    problem = make_problem(OPTIMAL, "largest-margin", required_box=asked, free=free)
+    outcome = optimise_design(problem, iterations=30)
+    box = outcome.design.required_box
+    assert box is not None
+    assert box[0][2] > 6.0
+    page = page_of(outcome.design, record=record_of(outcome, Settings()))
+    rows = table_of(page, "Box that a search required")
+    for axis, low, high in zip("xyz", *box, strict=True):
+        assert rows[axis].values == [low, high, 10.0 * low, 10.0 * high]
+    changes = table_of(page, "The design")
+    for word, own, found in zip(("from", "to"), asked, box, strict=True):
+        for axis, before, after in zip("xyz", own, found, strict=True):
+            row = changes[f"required box {axis} {word}"]
+            assert row.values == [before, after, after - before]
+    yaws = changes["yaw of home, °"].values
+    assert yaws[:2] == [problem.start_values[-3], outcome.best.values[-3]]
 
 
 @pytest.mark.parametrize("name", HOSTILE)

@@ -72,6 +72,7 @@ def message_of(data: bytes | dict[str, Any], source: str = "some.json") -> str:
         ({"unit_mm": 1e7}, "unit_mm must not exceed 1e+06"),
         ({"unit_mm": 1e-8}, "unit_mm must be at least 1e-07"),
         ({"node_step": 0}, "node_step must be positive"),
+        ({"required_box": [[0, 0, 0], [1, 1, -1]]}, "required_box z: the low end 0 exceeds"),
         ({"limits": None}, "limits"),
         ({"home": {"position": [1, 2, 3]}}, "quaternion"),
         ({"home": HOME | {"quaternion": [0, 0, 0, 0]}}, "quaternion must not be all zeros"),

@@ -79,5 +79,6 @@ def complete_designs(draw: st.DrawFn) -> Design:
         node_step=draw(st.none() | st.floats(1e-3, 1e3)),
         limits=draw(limits()),
         home=draw(st.none() | poses),
+        required_box=draw(st.none() | boxes),
         **draw(st.just(ideal) | machines()),
     )

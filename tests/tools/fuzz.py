@@ -63,6 +63,7 @@ MACHINE: dict[str, Any] = {
     "struts": {"outer_mm": 6, "inner_mm": 4, "stress_mpa": 200},
     "guide": {"force_n": 100, "moment_nm": None},
     "tolerances": {"a3": [0.1, 0.1, 0], "guide_tilt_deg": [0.1, 0]},
+    "required_box": [[4, 2, 4], [6, 4, 6]],
 }
 """A design file with the fields that the second schema added."""
 

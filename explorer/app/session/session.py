@@ -34,6 +34,7 @@ FIELD_WORDS = {
     "name": "The name",
     "unit_mm": "The unit",
     "node_step": "The step of the nodes",
+    "required_box": "The required box",
     "limits.leg_radii": "The radius of a leg",
     "tool.position": "The tool point",
     "payload.mass_kg": "The mass of the payload",

@@ -308,15 +308,17 @@ def outcome_lines(outcome: outcomes.Outcome, written: Sequence[Path]) -> Iterato
     """Yield an outcome as lines of text, with the start and the best design side by side."""
     problem = outcome.problem
     yield output.heading(optimised_design(outcome))
-    before, after = outcomes.compare_designs(
-        problem, problem.start, outcome.design, outcome.best.values
-    )
+    before, after = outcomes.compare_designs(problem, problem.start, outcome.design)
     optimum = "optimum" if outcome.converged else "best so far"
     rows: list[tuple[str, ...]] = [("", "start", optimum, "change")]
     for name, pair in measure_rows(before, after):
         finite = [value for value in pair if value is not None and math.isfinite(value)]
         change = f"{finite[1] - finite[0]:+.6g}" if len(finite) == len(pair) else ""
         rows.append((name, *map(_cell, pair), change))
+    for name, *ends in outcomes.box_moves(problem, outcome.best.values):
+        (low, _), (found, _) = ends
+        cells = (" to ".join(map(output.figure, pair)) for pair in ends)
+        rows.append((name, *cells, f"{found - low:+.6g}"))
     if outcome.converged:
         yield from (outcome.message, "")
     yield output.table(rows, "<>>>")

@@ -25,7 +25,15 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import encode_design
 from explorer.numerics.number_text import UNITS, format_number, power_of_ten
-from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Curve, Record, curves_of
+from explorer.optimise.outcome import (
+    GOALS,
+    OBJECTIVE_SYMBOLS,
+    Curve,
+    Record,
+    box_moves,
+    curves_of,
+)
+from explorer.optimise.problem import REACH, YAW
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
@@ -150,7 +158,15 @@ def search_section(data: ReportData) -> Iterator[Element]:
         rows.append(("held by", run.holding))
     names = [*((element("b", name),) for name in VARIABLES), (element("b", "|a3|"), " reach")]
     before, after = ((*each.variables, each.reach) for each in (problem.start, record.design))
-    changes = [(*row, row[2] - row[1]) for row in zip(names, before, after, strict=True)]
+    changes: list[Row] = [(*row, row[2] - row[1]) for row in zip(names, before, after, strict=True)]
+    if best is not None:
+        labels = {YAW: "yaw of home, °", REACH: "longest leg"}
+        for name, old, new in zip(problem.names, problem.start_values, best.values, strict=True):
+            if name in labels:
+                changes.append((labels[name], old, new, new - old))
+        for name, *ends in box_moves(problem, best.values):
+            for word, old, new in zip(("from", "to"), *ends, strict=True):
+                changes.append((f"{name} {word}", old, new, new - old))
     heads = ("units", "start", "optimum", "change")
     yield element(
         "div",

@@ -70,6 +70,7 @@ def mechanism_section(data: ReportData) -> Iterator[Element]:
     yield element("div", variables, _pose(data), class_="pair")
     yield _joints(data)
     yield _limits(data)
+    yield from _required_box(data)
     broken = data.snapshot.violations
     if broken:
         words = f"This pose breaks limits: {'; '.join(map(str, broken))}."
@@ -124,6 +125,19 @@ def _limits(data: ReportData) -> Element:
     for leg, radius in enumerate(data.design.limits.leg_radii, 1):
         rows.append(_lengths(data, f"radius of leg {leg}", radius))
     return markup.table(("limit", "units", "mm"), rows, "<>>", "Limits in force")
+
+
+def _required_box(data: ReportData) -> Iterator[Element]:
+    """Yield the box that a search required of the workspace, if one did."""
+    box, unit = data.design.required_box, data.design.unit_mm
+    if box is None:
+        return
+    rows: list[Row] = [
+        (axis, low, high, low * unit, high * unit)
+        for axis, low, high in zip("xyz", *box, strict=True)
+    ]
+    heads = ("of b4", "from, units", "to, units", "from, mm", "to, mm")
+    yield markup.table(heads, rows, "<>>>>", "Box that a search required of the workspace")
 
 
 def singularity_section(data: ReportData) -> Iterator[Element]:

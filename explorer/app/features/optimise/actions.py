@@ -15,7 +15,7 @@ from explorer.app.features.optimise.state import PLACE, Optimisation, SearchResu
 from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, problem_of
 from explorer.app.state.actions import Action, Open, Set, check_free, move_to
 from explorer.app.state.geometry import with_machine
-from explorer.app.state.parts import parts_kept_on_open, with_value
+from explorer.app.state.parts import parts_kept_on_open, value_at, with_value
 from explorer.app.state.state import State
 from explorer.errors import InputError, NoAnswerError
 from explorer.measures.catalogue import Measurements
@@ -27,6 +27,7 @@ from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import MAXIMA, SWING_LIMIT, YAW, with_box
 
 SUFFIX = "-optimised"
+BOX = "optimisation.request.box"
 LIMIT_NAMES = {SWING_LIMIT: "bounds of the swing", "margin": "least margin"}
 
 
@@ -64,13 +65,15 @@ class StartRun(Action):
         impossible = find_refusals(state)
         if impossible:
             raise NoAnswerError("; ".join(refusal.message for refusal in impossible))
-        # A result that is not accepted is not yet a design of the user.
-        own = optimisation.undecided.own if optimisation.undecided is not None else state
+        own = replace(state, optimisation=Optimisation(optimisation.request))
+        if optimisation.undecided is not None:
+            # A result that is not accepted is not yet a design of the user.
+            own = optimisation.undecided.own
         run = SearchRun(
             number=optimisation.count + 1,
             problem=problem_of(state),
             starts=optimisation.request.starts,
-            own=replace(own, optimisation=Optimisation()),
+            own=own,
         )
         # The run shows its workspace.
         shown = with_value(state, "view.workspace.solid", True)
@@ -162,7 +165,10 @@ class Advance(Action):
 
 @dataclass(frozen=True)
 class EndRun(Action):
-    """End a run and show its result, or without one the user's own design."""
+    """End a run and show its result, or without one the user's own design.
+
+    The required box is requested where the search found it.
+    """
 
     template: ClassVar[str] = "Optimise: {design}"
 
@@ -180,7 +186,10 @@ class EndRun(Action):
         after = with_value(state, "optimisation.run", ended)
         if self.verdict.best is None:
             return _restore_own(after, run.own)
-        return _with_design(after, _rename(self.verdict.best.design))
+        best = self.verdict.best.design
+        if best.required_box is not None:
+            after = with_value(after, BOX, best.required_box)
+        return _with_design(after, _rename(best))
 
 
 @dataclass(frozen=True)
@@ -214,16 +223,19 @@ class Accept(Action):
 
 @dataclass(frozen=True)
 class Revert(Action):
-    """Return to the user's own design in its pose, exactly."""
+    """Return to the user's own design in its pose, exactly, and to its required box."""
 
     template: ClassVar[str] = "Revert to {design}"
 
     def apply(self, state: State) -> State:
         """Return the next state."""
         run = Optimisation.of(state).undecided
-        if run is None:
+        if run is None or run.best is None:
             return state
-        return _restore_own(with_value(state, "optimisation.run", None), run.own)
+        after = with_value(state, "optimisation.run", None)
+        if value_at(state, BOX) == run.best.design.required_box:
+            after = with_value(after, BOX, value_at(run.own, BOX))
+        return _restore_own(after, run.own)
 
 
 def _running(state: State, number: int) -> SearchRun | None:

@@ -350,9 +350,7 @@ def visible_box(state: State) -> Box | None:
     """Return the box of the present run, else that of the problem, if any."""
     run = Optimisation.of(state).run
     if run is not None and run.iterates and not run.accepted:
-        if run.problem.demands.required_box is None:
-            return None
-        return run.problem.required_box_at((run.best or run.iterates[-1]).values)
+        return (run.best or run.iterates[-1]).design.required_box
     return requested_box(state) if _request(state).needs_box else None
 
 

@@ -147,7 +147,7 @@ class Optimiser(Runner):
             self.worker.submit(
                 "compare",
                 compare_designs,
-                (run.problem, run.own.design, best.design, best.values),
+                (run.problem, run.own.design, best.design),
                 lambda both: self._session.do(Compare(run.number, both)),
                 lambda _: None,
             )

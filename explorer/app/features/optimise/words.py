@@ -16,11 +16,11 @@ from explorer.app.widgets import markup
 from explorer.measures.blocks.block import Look
 from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.measure import CERTAIN
-from explorer.mechanism.design import VARIABLES, Design
+from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise import problem as problems
 from explorer.optimise.conflicts import Conflict
-from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Iterate
+from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Iterate, box_moves
 from explorer.workspace.limits.quantities import DIGITS as LIMIT_DIGITS
 from explorer.workspace.limits.table import limits_in_force
 
@@ -209,11 +209,14 @@ def comparison_table(run: SearchRun, view: View) -> str:
         Column(number, each.design, each, view.unit_for(each.design))
         for number, each in enumerate(run.comparison)
     ]
-    rows = (
+    rows = [
         _comparison_row(run.problem, name, columns)
         for name in run.comparison[1].values
         if name != problems.YAW or problems.YAW in run.problem.names
-    )
+    ]
+    if run.best is not None:
+        moves = box_moves(run.problem, run.best.values)
+        rows += [_box_row(*move, columns[-1].unit) for move in moves]
     head = "".join(f'<td class="ex-number">{each}</td>' for each in ("", "old", "new", "change"))
     return f'<table class="ex-compare"><tr class="ex-dim">{head}</tr>{"".join(rows)}</table>'
 
@@ -233,6 +236,16 @@ def _comparison_row(problem: problems.Problem, name: str, columns: Sequence[Colu
     look = "ex-first" if name == VARIABLES[0] else look
     change = _look_of_change(problem, name, *(column.value(measure) for column in columns))
     return measure_row(measure, columns, label=label, hint=hint, look=look, change=change)
+
+
+def _box_row(name: str, before: Pair, after: Pair, unit: Unit) -> str:
+    """Return the row of an axis of the required box: where it began, and where it was found."""
+    way = unit.number(after[0] - before[0], 5, size=after[1])
+    texts = (unit.number(before[0], 5), unit.number(after[0], 5), f"{'+' * (after > before)}{way}")
+    cells = "".join(f'<td class="ex-number">{text}</td>' for text in texts)
+    hint = "Lower end of the required box, which the search may move; its edges keep their lengths."
+    label = f'{name} from <span class="ex-dim ex-small">{unit.name}</span>'
+    return f'<tr title="{hint}"><td>{label}</td>{cells}</tr>'
 
 
 def _look_of_change(

@@ -44,13 +44,13 @@ def _complete(request: OptimisationRequest, base: Design) -> OptimisationRequest
         request,
         volume=request.volume or _default_volume(base, request.objective),
         reach=request.reach or longest_leg(base),
-        box=request.box or box_within(base),
+        box=request.box or default_box(base),
     )
 
 
 def requested_box(state: State) -> problems.Box:
     """Return the required box."""
-    return Optimisation.of(state).request.box or box_within(state.base)
+    return Optimisation.of(state).request.box or default_box(state.base)
 
 
 def problem_of(state: State) -> problems.Problem:
@@ -114,6 +114,11 @@ def is_paper_box_on_offer(state: State) -> bool:
     boxed = problems.with_box(state.design, conflicts.PAPER_BOX)
     left = _find_refusals(boxed, complete_request(state), state.unit)
     return boxed != state.design and all(each.limit != conflicts.BOX_LIMIT for each in left)
+
+
+def default_box(design: Design) -> problems.Box:
+    """Return the box that a search has required of a design, or one within its workspace."""
+    return design.required_box or box_within(design)
 
 
 @lru_cache(maxsize=8)
