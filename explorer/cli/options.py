@@ -53,6 +53,13 @@ def replace_given(struct: _Struct, **changes: object) -> _Struct:
     return msgspec.structs.replace(struct, **given)
 
 
+def with_payload(design: Design, mass_kg: float | None) -> Design:
+    """Return a design with the mass of its payload that is given; itself for None."""
+    if mass_kg is None:
+        return design
+    return msgspec.structs.replace(design, payload=design.payload.with_mass(mass_kg))
+
+
 def load(name: str) -> Design:
     """Return a preset, the design in a file, or a design saved on the page."""
     try:

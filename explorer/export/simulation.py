@@ -139,12 +139,6 @@ class SimulationModel:
         self.readings[list(ACTUATED)] -= machine.encoder_offsets
         self.servos = servos_of(design, self.masses, elastic=not self.is_perfect)
         self.masses = with_payload(design, self.masses)
-        least, middle, most = np.linalg.eigvalsh(self.masses["platform"].inertia).tolist()
-        if most > (least + middle) * (1.0 + 1e-9):
-            raise InputError(
-                "no body has the moments of inertia of the payload, of which one exceeds the sum "
-                "of the others; correct payload.inertia_kg_mm2"
-            )
         self.strokes = strokes_of(design, joints[list(ACTUATED)])
 
     @property

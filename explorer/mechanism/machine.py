@@ -25,6 +25,9 @@ Six = tuple[float, float, float, float, float, float]
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, in m/s²."""
 
+# Share by which rounding may raise a moment of inertia above the sum of the others.
+ROUNDING = 1e-9
+
 LARGEST_DISTANCE = 100.0
 """Largest distance of the tool and of the payload's centre from b4, as a multiple of the reach."""
 
@@ -72,7 +75,8 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             taken as principal axes, in kg mm²; zeros for a point mass.
 
     Raises:
-        DesignError: The mass, the force or a moment is negative, or a value is not finite.
+        DesignError: The mass, the force or a moment is negative, a value is not finite, or no body
+            has the inertia, see `inertia_problem`.
     """
 
     mass_kg: float = 0.0
@@ -87,11 +91,29 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         name = "payload.inertia_kg_mm2"
         moments = numbers(name, self.inertia_kg_mm2, 3, STIFFEST)
         _set(self, "inertia_kg_mm2", tuple(not_negative(name, each, STIFFEST) for each in moments))
+        if problem := inertia_problem(self.mass_kg, self.inertia_kg_mm2):
+            raise DesignError(f"{name} {problem}", name)
+
+    def with_mass(self, mass_kg: float) -> Payload:
+        """Return the payload with another mass; one without a mass has no inertia."""
+        moments = self.inertia_kg_mm2 if mass_kg else (0.0, 0.0, 0.0)
+        return msgspec.structs.replace(self, mass_kg=mass_kg, inertia_kg_mm2=moments)
 
     @property
     def weight_n(self) -> float:
         """Weight of the mass, in newtons."""
         return self.mass_kg * STANDARD_GRAVITY
+
+
+def inertia_problem(mass_kg: float, moments: Triple) -> str:
+    """Return why no body of a mass has principal moments of inertia; "" if one has."""
+    largest, others = max(moments), sum(sorted(moments)[:2])
+    if largest > others * (1.0 + ROUNDING):
+        least, got = format_apart((others, largest))
+        return f"has a moment above the sum of the other two, {least}, as no body has; got {got}"
+    if largest and not mass_kg:
+        return "must be zero without a mass; state payload.mass_kg too"
+    return ""
 
 
 def or_infinite(six: Six | None) -> FloatArray:

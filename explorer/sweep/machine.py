@@ -11,7 +11,7 @@ import msgspec
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Actuators, Tool
+from explorer.mechanism.machine import Actuators, Payload, Tool
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,8 @@ class MachineVariable:
         """
         part = getattr(design, self.part)
         changes: dict[str, object] = {self.field: value}
+        if isinstance(part, Payload) and self.field == "mass_kg":
+            return msgspec.structs.replace(design, payload=part.with_mass(value))
         if isinstance(part, Actuators):
             changes = {"push_n": (value,) * 6, "pull_n": None}
         elif self.axis is not None:

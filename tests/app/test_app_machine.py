@@ -91,7 +91,6 @@ def design_with(**machine: Any) -> Design:
 PLAIN: list[tuple[str, object, Callable[[Design], object]]] = [
     ("tool z", 3.25, lambda design: design.tool.position[2]),
     ("Mass (kg)", 2.5, lambda design: design.payload.mass_kg),
-    ("Inertia (kg mm²)", (9.0, 8.0, 7.0), lambda design: design.payload.inertia_kg_mm2),
     ("centre y", -1.5, lambda design: design.payload.centre[1]),
     ("Force on the tool (N)", 20.0, lambda design: design.payload.force_n),
     ("Gravity", "along −y", lambda design: design.gravity[1] == -1.0),
@@ -125,6 +124,33 @@ def test_control_changes_the_design_in_one_step_that_is_undone_and_saved(
     assert (desk.session.history.at, desk.complaints) == (1, [])
     desk.session.do(UNDO)
     assert desk.state == start
+
+
+def test_inertia_is_taken_once_the_payload_can_have_it(hand: Hand, desk: Desk) -> None:
+    label = "Inertia (kg mm²)"
+    hand.set(label, (9.0, 8.0, 7.0))
+    assert "the inertia must be zero without a mass" in hand.show()
+    hand.set("Mass (kg)", 2.5)
+    assert hand.controls[label].value == (0.0, 0.0, 0.0)
+    # The fields are typed one after the other.
+    for typed, taken in (
+        ((9.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        ((9.0, 8.0, 0.0), (0.0, 0.0, 0.0)),
+        ((9.0, 8.0, 7.0), (9.0, 8.0, 7.0)),
+        ((9.0, 8.0, 18.0), (9.0, 8.0, 7.0)),
+    ):
+        assert hand.set(label, typed).payload.inertia_kg_mm2 == taken
+        assert hand.controls[label].value == typed
+        assert ("has a moment above the sum of the other two" in hand.show()) == (typed != taken)
+    assert (desk.session.history.at, desk.complaints) == (2, [])
+    # What is not taken goes with the next payload.
+    hand.set("Force on the tool (N)", 1.0)
+    assert hand.controls[label].value == (9.0, 8.0, 7.0)
+    hand.set("Mass (kg)", 0.0)
+    (complaint,) = desk.complaints
+    assert "The inertia of the payload must be zero without a mass" in str(complaint)
+    assert hand.set(label, (0.0, 0.0, 0.0)).payload.inertia_kg_mm2 == (0.0, 0.0, 0.0)
+    assert hand.set("Mass (kg)", 0.0).payload.mass_kg == 0.0
 
 
 def test_limits_are_switched_on_set_and_switched_off(hand: Hand) -> None:

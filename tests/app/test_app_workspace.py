@@ -255,6 +255,12 @@ def test_map_has_the_exact_outline_of_the_slice(axis: Axis) -> None:
         assert np.linalg.norm(places - point, axis=1).min() < 2e-3
 
 
+def test_payload_that_does_not_count_has_no_inertia_either() -> None:
+    body = Payload(0.5, (0.0, 0.0, 1.0), 3.0, (3.0, 4.0, 5.0))
+    state = load_state(msgspec.structs.replace(LOADED, payload=body), ForcesView(weighed="none"))
+    assert feeds.loaded_design(state).payload == body.with_mass(0.0)
+
+
 @pytest.mark.parametrize("region", ["limits", "held"])
 @pytest.mark.parametrize("colour", ["plain", "margin", "condition", "share", "force"])
 def test_legend_names_the_measure_of_the_map_and_the_levels_of_its_bands(

@@ -107,6 +107,15 @@ def test_parts_of_the_prototype_weigh_in_place_of_bars(cli: CommandLine) -> None
     assert "--density" in cli.refusal("forces", *POSE, "--parts")
 
 
+def test_forces_without_the_payload_leave_its_inertia_out(cli: CommandLine) -> None:
+    body = explorer.Payload(0.3, (0.0, 0.0, 1.0), inertia_kg_mm2=(3.0, 4.0, 5.0))
+    heavy = msgspec.structs.replace(MACHINE, payload=body)
+    found = cli.answer("forces", *POSE, "--payload", 0, "--design", heavy)
+    assert found == cli.answer("forces", *POSE, "--payload", 0, "--design", MACHINE)
+    assert body.with_mass(0.0).inertia_kg_mm2 == (0.0, 0.0, 0.0)
+    assert body.with_mass(2.0) == msgspec.structs.replace(body, mass_kg=2.0)
+
+
 def test_forces_of_payload_are_those_of_its_weight(cli: CommandLine) -> None:
     for mass in (2.0, 0.0):
         found = cli.answer("forces", *POSE, "--payload", mass, "--design", MACHINE)

@@ -9,11 +9,14 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
+from hypothesis.extra import numpy as hnp
 from refusals import refusal
 
 from explorer import PRESETS, Design, decode_design, encode_design
 from explorer.errors import DesignError
 from explorer.mechanism.machine import DIMENSIONS, Guide, Payload, Struts, Tolerances, Tool
+from explorer.numerics.arrays import FloatArray
 
 OPTIMAL = PRESETS["paper-optimal"]
 SIX = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
@@ -35,6 +38,15 @@ def decode(**fields: Any) -> Design:
         ({"payload": {"mass_kg": -1}}, "payload.mass_kg must not be negative; got -1"),
         ({"payload": {"centre": [0, 1e5, 0]}}, "payload.centre must lie within"),
         ({"payload": {"inertia_kg_mm2": [1, -1, 1]}}, "payload.inertia_kg_mm2 must not be neg"),
+        (
+            {"payload": {"mass_kg": 1, "inertia_kg_mm2": [1e6, 0, 0]}},
+            "payload.inertia_kg_mm2 has a moment above the sum of the other two, 0, as no body has",
+        ),
+        ({"payload": {"mass_kg": 1, "inertia_kg_mm2": [2, 3, 5.001]}}, "two, 5, as no body has"),
+        (
+            {"payload": {"inertia_kg_mm2": [3, 4, 5]}},
+            "payload.inertia_kg_mm2 must be zero without a mass; state payload.mass_kg too",
+        ),
         ({"payload": None}, "payload"),
         ({"gravity": [0, 0, 0]}, "gravity must not be all zeros"),
         ({"gravity": [0, 0]}, "gravity"),
@@ -58,6 +70,14 @@ def decode(**fields: Any) -> Design:
 )
 def test_machine_unusable_value_is_refused_by_its_name(fields: dict[str, Any], words: str) -> None:
     assert words in refusal(lambda: decode(**fields), kind=DesignError)
+
+
+@given(st.floats(1e-6, 1e3), hnp.arrays(np.float64, (4, 3), elements=st.floats(-1e3, 1e3)))
+def test_payload_has_the_moments_of_any_body(mass_kg: float, points: FloatArray) -> None:
+    squares = (points * points).sum(axis=0)
+    moments = mass_kg * (squares.sum() - squares)
+    payload = Payload(mass_kg, inertia_kg_mm2=tuple(moments.tolist()))
+    assert payload.inertia_kg_mm2 == tuple(moments.tolist())
 
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, "1", True, 10**400])

@@ -27,7 +27,7 @@ from explorer import (
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
-from explorer.mechanism.machine import Actuators, Tool
+from explorer.mechanism.machine import Actuators, Payload, Tool
 from explorer.mechanism.pose import Pose
 from explorer.statics.loaded import LoadedPose
 from explorer.sweep.machine import MACHINE
@@ -317,6 +317,13 @@ def test_limits_of_a_study_replace_both_sides_of_the_design() -> None:
     push, pull = design_of(study, {"actuator_limit": 70.0}).actuators.limits
     assert push.tolist() == pull.tolist() == [70.0] * 6
     assert MACHINE["actuator_limit"].value_in(study.base) == 1.0
+
+
+def test_payload_of_a_study_without_a_mass_has_no_inertia() -> None:
+    body = Payload(1.0, inertia_kg_mm2=(3.0, 4.0, 5.0))
+    design = msgspec.structs.replace(OPTIMAL, payload=body)
+    assert MACHINE["payload_mass"].with_value(design, 2.0).payload == body.with_mass(2.0)
+    assert MACHINE["payload_mass"].with_value(design, 0.0).payload == Payload()
 
 
 @pytest.mark.parametrize("name", [*MACHINE])

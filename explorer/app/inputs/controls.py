@@ -47,10 +47,13 @@ Value = TypeVar("Value", float, bool, str, Pair, Triple)
 
 @dataclass(frozen=True)
 class Bound(Generic[Value]):
-    """The binding of a control: how its value is read in a frame, and written as an action."""
+    """The binding of a control: how its value is read in a frame, and written as an action.
+
+    The action is None while the value does not change the state.
+    """
 
     read: Callable[[Frame], Value]
-    write: Callable[[State, Value], Action]
+    write: Callable[[State, Value], Action | None]
 
 
 def item(
@@ -120,7 +123,7 @@ def in_unit(bound: Bound[Any], power: int) -> Bound[Any]:
         values = tuple(map(unit.convert, _parts(value)))
         return values if isinstance(value, tuple) else values[0]
 
-    def write(state: State, new: Any) -> Action:
+    def write(state: State, new: Any) -> Action | None:
         frame, unit = Frame(state), state.unit_of(power)
         pairs = zip(_parts(new), _parts(bound.read(frame)), _parts(read(frame)), strict=True)
         values = [old if part == shown else unit.read(part) for part, old, shown in pairs]
@@ -186,7 +189,7 @@ class Control(Generic[Value]):
             stamp = self.handle.update_timestamp
             self.session.post(self, self._change, stamp=stamp, who=event.client_id)
 
-    def _change(self, state: State) -> Action:
+    def _change(self, state: State) -> Action | None:
         self._last_value = self.handle.value
         self._is_set_here = True
         for number in _parts(self._last_value):

@@ -225,8 +225,7 @@ class Drives(TimedOptions):
     def run(self) -> None:
         """Write what the path asks of the actuators."""
         design = self.with_radii(self.read_design())
-        payload = options.replace_given(design.payload, mass_kg=self.payload)
-        design = options.replace_given(design, payload=payload)
+        design = options.with_payload(design, self.payload)
         if self.out is not None:
             check_writable(self.out)
         poses, tool = self._poses(design), self.tool(design)

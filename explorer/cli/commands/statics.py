@@ -45,10 +45,7 @@ class LoadOptions(options.JsonOptions, options.PoseOptions):
 
     def read_loaded_design(self) -> Design:
         """Return the design with the given mass of the payload."""
-        design = self.read_design()
-        return options.replace_given(
-            design, payload=options.replace_given(design.payload, mass_kg=self.payload)
-        )
+        return options.with_payload(self.read_design(), self.payload)
 
 
 def singular_error(pose: Pose, words: str) -> NoAnswerError:

@@ -25,7 +25,14 @@ from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.markup import box, note
 from explorer.app.widgets.palette import NO_OPTION
 from explorer.mechanism.design import DOWN, Design
-from explorer.mechanism.machine import Actuators, Struts, Tolerances, Tool
+from explorer.mechanism.machine import (
+    Actuators,
+    Payload,
+    Struts,
+    Tolerances,
+    Tool,
+    inertia_problem,
+)
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_number
@@ -78,6 +85,8 @@ class MachinePanel:
     def __init__(self, services: Services) -> None:
         gui = services.gui
         self._controls = controls = MachineControls(gui, services.session)
+        # Moments of inertia that are being typed, and the payload that cannot have them.
+        self._typed: tuple[Payload, Triple] | None = None
         self._summary = gui.add_html("")
         controls.button(
             "Ideal machine",
@@ -106,9 +115,10 @@ class MachinePanel:
                 "Inertia (kg mm²)",
                 "Moments of inertia about the payload's centre along the platform's axes; they "
                 "count in motions only.",
-                "design.payload.inertia_kg_mm2",
+                Bound(lambda frame: self._inertia(frame.state), self._set_inertia),
                 step=FINE,
             )
+            self._no_body = gui.add_html("", visible=False)
             controls.field(
                 "Force on the tool (N)",
                 "Largest force of the process, which acts at the tool point in any direction.",
@@ -134,8 +144,25 @@ class MachinePanel:
         weight = design.payload.weight_n
         words = note(f"Its weight is {format_number(weight)} N.") if weight > 0.0 else ""
         yield from show_html(self._weight, words)
+        problem = inertia_problem(design.payload.mass_kg, self._inertia(state))
+        words = note(f"Not taken yet: the inertia {problem}.") if problem else ""
+        yield from show_html(self._no_body, words)
         yield self._moment, "content", note(moment_words(design.struts))
         yield from self._controls.updates(frame)
+
+    def _inertia(self, state: State) -> Triple:
+        """Return the moments of inertia, or those typed so far for this payload."""
+        payload, typed = state.design.payload, self._typed
+        return typed[1] if typed and typed[0] == payload else payload.inertia_kg_mm2
+
+    def _set_inertia(self, state: State, moments: Triple) -> Action | None:
+        """Return the action that sets moments of inertia; None while no body has them."""
+        payload = state.design.payload
+        if min(moments) >= 0.0 and inertia_problem(payload.mass_kg, moments):
+            self._typed = payload, moments
+            return None
+        self._typed = None
+        return Set("design.payload.inertia_kg_mm2", moments, "Inertia (kg mm²)")
 
     def _add_point(self, name: str, point: str, path: str) -> None:
         for axis, letter in enumerate("xyz"):

@@ -75,8 +75,7 @@ def loaded_design(state: State) -> Design:
     design = state.design
     if state.view.forces.weighed != "none" or not design.payload.mass_kg:
         return design
-    payload = msgspec.structs.replace(design.payload, mass_kg=0.0)
-    return msgspec.structs.replace(design, payload=payload)
+    return msgspec.structs.replace(design, payload=design.payload.with_mass(0.0))
 
 
 def measure_of_colour(state: State) -> Measure:
