@@ -73,6 +73,7 @@ def asked() -> State:
         FULL.with_limits(leg_radii=(0.8, 0.7, 0.6, 0.5)),
         gravity=(0.0, -1.0, 0.0),
         actuators=Actuators(error_mm=PRECISE.actuators.error_mm, speed_mm_s=same_for_all(50.0)),
+        required_box=((5.0, 2.0, 7.0), (15.0, 8.0, 11.0)),
         tolerances=Tolerances(a1=(0.1, 0.2, 0.3)),
     )
     start, goal = (Pose((9.0, y, 9.0), OPTIMAL.home_pose.quaternion) for y in (5.0, 6.5))
@@ -112,8 +113,10 @@ def test_presets_and_unit_of_the_page_keep_payload_actuators_and_demands(
     asked: State, desk: Desk, services: Services
 ) -> None:
     panel = DesignPanel(services)
-    controls = [handle for handle, *_ in panel.updates(Frame(desk.state))]
-    named = {getattr(each, "label", ""): each for each in controls}
+    named: dict[str, Any] = {}
+    for handle, name, value in panel.updates(Frame(desk.state)):
+        setattr(handle, name, value)
+        named[getattr(handle, "label", "")] = handle
     asked = with_value(asked, "optimisation.request.box", ((5.0, 2.0, 7.0), (25.0, 8.0, 11.0)))
     desk.session.do(Open(asked.design))
     desk.session.do(Set("optimisation", asked.optimisation))
@@ -162,6 +165,8 @@ def test_millimetres_that_were_asked_for_stay_in_another_unit(
     # What is shown as 200 mm is 200 again, and not 199.99999999999997.
     text = after.unit.convert(request.box[1][0]) if request.box else 0.0
     assert text == 150.0
+    # A preset has no box that a search required; of the same design it is where it was.
+    assert after.design.required_box == (None if is_preset else request.box)
     if not is_preset:
         assert after.design.variables == asked.design.variables
         assert after.design.limits.box == asked.design.limits.box

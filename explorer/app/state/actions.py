@@ -15,7 +15,7 @@ import numpy as np
 
 from explorer.app.state import state as states
 from explorer.app.state.clear_length import clear_length
-from explorer.app.state.parts import parts_kept_on_open, with_value
+from explorer.app.state.parts import in_unit, parts_kept_on_open, with_value
 from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.app.state.view import DrawnAs
 from explorer.errors import InputError
@@ -349,6 +349,9 @@ class Set(Action):
             return with_value(state, self.at, self.value)
         check_free(state)
         design = with_value(state, self.at, self.value).design
+        if design.required_box == state.design.required_box:
+            box = in_unit(design.required_box, state.unit, state.view.unit_for(design))
+            design = msgspec.structs.replace(design, required_box=box)
         return replace(state.in_unit_of(design), design=design)
 
     def words(self) -> str:

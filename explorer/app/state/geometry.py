@@ -5,6 +5,7 @@
 | geometry: all other fields of the design | the preset's | grows with it | the file's |
 | machine: `MACHINE`, and the radii of the legs | stays | stays | the file's |
 | what is asked and shown: see `LENGTHS` | stays | stays | stays |
+| the box that a search has required | the preset's: none | stays | the file's |
 
 A length that stays keeps its value in the unit that the page shows, millimetres or design units.
 """
