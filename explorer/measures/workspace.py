@@ -122,7 +122,8 @@ def _sizes() -> Iterable[Measure]:
     yield More(
         "volume",
         "volume",
-        "Exact volume of the workspace at the home's orientation",
+        "Volume of the workspace at the home's orientation: exact, or good to about 1e-4 where "
+        "joints bound the swing of legs",
         lambda case: case.volume.volume,
         title="exact volume",
         power=3,

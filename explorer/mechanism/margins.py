@@ -4,9 +4,10 @@ The manipulator is singular exactly where one of three tetrahedra is flat, that 
 elements of the base and platform flags are incident (the paper's section on singularities).
 These singularities are parallel, type 2 of Gosselin and Angeles (1990): an instantaneous freedom
 with locked actuators. Each margin is a signed number in design units that is zero at one of these
-incidences, linear in the position at a fixed orientation. The set of poses with one sign triple is
-an *aspect* in the field's terms; no path leaves it without a singular pose, so that the mechanism
-is non-cuspidal. Margins depend on the pose alone, not on the design.
+incidences, linear in the position at a fixed orientation. The poses with one sign triple are a
+maximal connected set without a singular pose, an *aspect* in the field's terms; no path leaves it
+without one, so that the mechanism is non-cuspidal. Margins depend on the pose alone, not on the
+design.
 """
 
 from __future__ import annotations

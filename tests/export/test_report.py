@@ -350,6 +350,7 @@ def test_report_swing_limits_are_drawn_from_a_grid() -> None:
     assert "the outlines are those of a fine grid" in page.text
     limits = table_of(page, "Limits in force")
     assert "at most 30°" in limits["swing a1"].text
+    assert "exact to rounding" not in page.text
     assert any("clip-path" in each.attributes for each in page.all("g"))
 
 

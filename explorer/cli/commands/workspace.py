@@ -209,9 +209,10 @@ class _Answer:
         for name, value in measured.items():
             measure = CATALOGUE[name]
             if measure.power == CATALOGUE["volume"].power:
-                remark = f"{nodes.count} nodes at multiples of {nodes.step:.6g}"
-                remark = remark if name == "node_volume" else ""
-                self.volumes.append((measure.heading, value or 0.0, remark))
+                remarks = {"node_volume": f"{nodes.count} nodes at multiples of {nodes.step:.6g}"}
+                if case.volume.error and not case.volume.gradient:
+                    remarks["volume"] = f"± {case.volume.error:.1g}, since swings are bounded"
+                self.volumes.append((measure.heading, value or 0.0, remarks.get(name, "")))
             elif name not in _IN_REMARK:
                 text = "none" if value is None else output.figure(value)
                 others.append((measure.heading, f"{text} {measure.unit_in(UNITS).name}".rstrip()))

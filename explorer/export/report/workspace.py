@@ -31,6 +31,7 @@ from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.workspace.carried_region import CarriedRegion
 from explorer.workspace.limits.table import bounds_angles
 from explorer.workspace.position_bands import position_bands
+from explorer.workspace.slices.volume import COLUMNS
 from explorer.workspace.solids.solid import Solid, convex_hull
 
 
@@ -45,9 +46,12 @@ def workspace_section(data: ReportData) -> Iterator[Element]:
             class_="note",
         )
         return
+    how = "integrated from exact slices and exact to rounding"
+    if not data.volume.gradient:
+        how = f"the sum of {COLUMNS} × {COLUMNS} columns, since joints bound the swing of legs"
     yield paragraph(
         "All positions of b4 within the limits, at the orientation of ",
-        f"{data.pose_words}. The volume is integrated from exact slices and exact to rounding; ",
+        f"{data.pose_words}. The volume is {how}; ",
         "the node volume is counted as in the paper: grid nodes, boundary included, times step³.",
     )
     solid, bounding = data.solid, None
@@ -98,7 +102,8 @@ def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
 def _volumes(data: ReportData) -> Element:
     counted, solid, accessible = data.node_count, data.solid, data.accessible
     is_exact = data.volume.error <= 1e-6 * data.volume.volume
-    remarks: dict[str, Cell] = {"volume": "exact" if is_exact else "to four digits"}
+    within = "± ", number(data.volume.error, digits=1), " units³"
+    remarks: dict[str, Cell] = {"volume": "exact" if is_exact else within}
     if not isinstance(counted, ExplorerError):
         steps = (" nodes at multiples of ", number(counted.step), " units")
         remarks["node_volume"] = (whole(counted.count), *steps)

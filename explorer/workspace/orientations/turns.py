@@ -5,9 +5,9 @@ Along a turn by an angle s every entry of the rotation is a + b cos s + c sin s.
 Bernstein coefficients are its own over binomials (`explorer.numerics.bernstein`). A turn is an
 array (3, 3, 3): for each entry of the rotation the coefficients of (1 − u)², (1 − u) u and u².
 
-Each limit is such a polynomial: of degree 2 for l1, l4, the guide, the gap, the carriage order, the
-box and the margins, of degree 4 for d2 and d4, and of degree 8 for the cones of joints. With the
-tool at b4, l4 and the box are constant.
+Each limit but a cone is such a polynomial: of degree 2 for l1, l4, the guide, the gap, the carriage
+order, the box and the margins, of degree 4 for d2 and d4. Whether a cone contains its leg follows
+from the signs of two, of degrees 4 and 8. With the tool at b4, l4 and the box are constant.
 """
 
 from __future__ import annotations

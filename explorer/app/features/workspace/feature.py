@@ -293,7 +293,7 @@ def volume_figure(services: Services) -> Callable[[Frame], str]:
     def figure_of(frame: Frame) -> str:
         drawing, name = feed.drawing, "Volume"
         which = feeds.orientation_word(frame)
-        hint = f"Exact volume of the workspace within the limits, in the {which} orientation."
+        hint = f"Volume of the workspace within the limits, in the {which} orientation."
         if drawing is not None:
             name += feeds.orientation_suffix(drawing.request.design, drawing.request.rotation)
             if drawing.measured.volume <= 0.0:

@@ -174,7 +174,7 @@ class MeasuredVolume:
 
 
 def measure_volume(request: Selection) -> MeasuredVolume:
-    """Return the exact volume of a workspace within the limits."""
+    """Return the volume of a workspace within the limits."""
     return MeasuredVolume(request, _exact_volume(request.design, request.rotation))
 
 
