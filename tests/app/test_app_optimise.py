@@ -80,6 +80,7 @@ from explorer.app.state.actions import (
     SetVariable,
 )
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import set_unit
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View
 from explorer.app.widgets.buttons import Buttons
@@ -561,7 +562,9 @@ def test_place_that_a_search_found_is_in_fields_table_and_design_until_it_is_rev
     # A search that goes on from there begins there, and both lead back to the own box.
     again = StartRun().apply(ended)
     assert run_of(again).problem.demands.required_box == moved
-    for each in (ended, end(again, (moved_iterate(again),))):
+    in_unit = set_unit(ended, 4.0).apply(ended)
+    assert requested_box(in_unit) != moved
+    for each in (ended, in_unit, end(again, (moved_iterate(again),))):
         reverted = Revert().apply(each)
         assert requested_box(reverted) == box
         assert Optimisation.of(reverted).request == Optimisation.of(before).request

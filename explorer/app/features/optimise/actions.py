@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import msgspec
+import numpy as np
 
 from explorer.app.features.optimise.state import PLACE, Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, problem_of
@@ -232,10 +233,11 @@ class Revert(Action):
         run = Optimisation.of(state).undecided
         if run is None or run.best is None:
             return state
-        after = with_value(state, "optimisation.run", None)
-        if value_at(state, BOX) == run.best.design.required_box:
-            after = with_value(after, BOX, value_at(run.own, BOX))
-        return _restore_own(after, run.own)
+        after = _restore_own(with_value(state, "optimisation.run", None), run.own)
+        requested, found = value_at(after, BOX), run.best.design.required_box
+        # What has changed its unit and back may be off by rounding.
+        is_found = requested and found and np.allclose(requested, found, rtol=1e-9)
+        return with_value(after, BOX, value_at(run.own, BOX)) if is_found else after
 
 
 def _running(state: State, number: int) -> SearchRun | None:
