@@ -23,7 +23,8 @@ ANSWER = """milliseconds => new Promise((resolve) => {
     window.explorer.clock.advance(milliseconds);
     window.explorer.socket.listen(({ type }) => resolve(type));
 })"""
-# Notes at each frame whether the start screen and the bar are there, and how much has come.
+# Notes at each frame whether the start screen, the bar and parts of the scene are there, and how
+# much has come.
 WATCH = """(() => {
     window.noted = [];
     const note = () => {
@@ -31,7 +32,8 @@ WATCH = """(() => {
         const loaded = document.querySelector(".ex-start progress")?.value ?? null;
         const words = document.querySelector(".ex-start [role=status]")?.textContent;
         const dark = document.documentElement?.dataset.mantineColorScheme === "dark";
-        if (document.body) window.noted.push({ bar, loaded, words, dark });
+        const parts = Object.keys(window.__viserMutable?.nodeRefFromName ?? {}).length;
+        if (document.body) window.noted.push({ bar, parts, loaded, words, dark });
         requestAnimationFrame(note);
     };
     note();
@@ -118,7 +120,8 @@ def test_start_screen_says_how_much_has_come_and_covers_the_page_until_all_is_th
         assert min(loaded) < 0.6 < max(loaded) <= 1.0
         assert {each["words"] for each in covered} == {"Loading the page", "Loading the design"}
         # What it leaves behind is whole, in the colours that its user likes.
-        assert all(each["bar"] and each["dark"] for each in noted[len(covered) :])
+        for each in noted[len(covered) :]:
+            assert (each["bar"], each["dark"], each["parts"] > 50) == (True, True, True), each
         # Viser's page does not come again.
         assert page.evaluate(TRANSFERRED) > 500_000
         page.reload()

@@ -7,6 +7,7 @@ leaves once the whole page is there. Its scripts run before those of viser.
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Callable
 from dataclasses import replace
 from http import HTTPStatus
@@ -46,7 +47,7 @@ class ClientPage:
         def answer_page(connection: ServerConnection, request: Request) -> Response | None:
             path, _, _ = request.path.partition("?")
             if path in PATHS and "Upgrade" not in request.headers:
-                return _html(self.html())
+                return _html(self.html(), request)
             if path != VISER_PATH:
                 return answer(connection, request)
             response = answer(connection, replace(request, path=ITS_PATH))
@@ -59,8 +60,7 @@ class ClientPage:
 
     def html(self) -> str:
         """Return the page with the start screen."""
-        # Relative, since a proxy may have a path of its own before that of the explorer.
-        address = f".{VISER_PATH}?v={viser.__version__}"
+        address = f"{VISER_PATH[1:]}?v={viser.__version__}"
         start = read_script("start", address, VISER_PAGE.stat().st_size, self.count_messages())
         fields = {
             "style": read_file("start.css"),
@@ -69,10 +69,12 @@ class ClientPage:
         return Template(read_file("start.html")).substitute(fields)
 
 
-def _html(text: str) -> Response:
-    body = text.encode()
+def _html(text: str, request: Request) -> Response:
+    packs = "gzip" in request.headers.get("Accept-Encoding", "")
+    body = gzip.compress(text.encode()) if packs else text.encode()
     headers = {
         "Content-Type": "text/html; charset=utf-8",
+        "Content-Encoding": "gzip" if packs else "identity",
         "Content-Length": str(len(body)),
         "Cache-Control": "no-cache",
     }

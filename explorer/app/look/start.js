@@ -20,11 +20,12 @@ window.explorer.start ??= async (address, size, count) => {
   screen.dataset.theme = theme();
 
   const leave = () => {
-    const isApplied = window.__viserMutable?.messageQueue.length === 0;
+    const { messageQueue, nodeRefFromName } = window.__viserMutable ?? {};
+    // The root of the scene and its axes are there before all others.
+    const isBuilt = messageQueue?.length === 0 && Object.keys(nodeRefFromName).length > 2;
     // The explorer answers the theme that the page sends.
     const isThemed = document.documentElement.dataset.mantineColorScheme === theme();
-    if (isApplied && isThemed) screen.remove();
-    else clock.atFrame(leave);
+    clock.atFrame(isBuilt && isThemed ? () => screen.remove() : leave);
   };
   let received = 0;
   const listen = ({ type, messages }) => {
@@ -41,7 +42,9 @@ window.explorer.start ??= async (address, size, count) => {
   socket.listen(listen);
 
   try {
-    const response = await fetch(address);
+    // A proxy may have a path of its own before that of the explorer.
+    const folder = location.pathname.replace(/\/(index\.html)?$/, "");
+    const response = await fetch(`${folder}/${address}`);
     if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
     let bytes = 0;
     const counted = new TransformStream({
