@@ -17,10 +17,15 @@ from explorer.app.browser.headless import CHROMIUM_FLAGS, find_chromium
 from explorer.app.server import Running
 from explorer.app.state.actions import SetPosition
 
-ADVANCE = "milliseconds => window.explorer.clock.advance(milliseconds)"
+# Lets time pass by a pause after which the page looks whether it was answered.
+PAUSE = 2.5
+ADVANCE = """pause => {
+    window.explorer.clock.advance(pause);
+    return new Promise((resolve) => setTimeout(resolve));
+}"""
 # Lets time pass, and waits for what comes from the explorer after that.
-ANSWER = """milliseconds => new Promise((resolve) => {
-    window.explorer.clock.advance(milliseconds);
+ANSWER = """pause => new Promise((resolve) => {
+    window.explorer.clock.advance(pause);
     window.explorer.socket.listen(({ type }) => resolve(type));
 })"""
 # Notes at each frame whether the start screen, the bar and parts of the scene are there, and how
@@ -65,6 +70,12 @@ def suspended(running: Running) -> Generator[None]:
     goes_on.set()
 
 
+def wait_in_vain(tab: Tab, seconds: float) -> None:
+    """Let time pass for the page, and nobody answer it."""
+    for _ in range(round(seconds / PAUSE)):
+        tab.page.evaluate(ADVANCE, 1000.0 * PAUSE)
+
+
 def lost(tab: Tab) -> Locator:
     """Return the message that the explorer does not answer."""
     words = re.compile(r"The explorer has not answered since \d\d:\d\d:\d\d")
@@ -75,9 +86,9 @@ def test_silent_explorer_is_told_and_its_numbers_are_marked_until_it_answers(tab
     numbers = tab.page.locator("div[style*=opacity]:has(> * .ex-bar, > .ex-bar)").last
     tab.settle()
     with suspended(tab.running):
-        tab.page.evaluate(ADVANCE, 9_900)
+        wait_in_vain(tab, 7.5)
         expect(lost(tab)).to_have_count(0)
-        tab.page.evaluate(ADVANCE, 2_600)
+        wait_in_vain(tab, 7.5)
         expect(lost(tab)).to_be_visible()
         expect(numbers).to_have_css("opacity", "0.5")
     expect(lost(tab)).to_have_count(0)
@@ -88,7 +99,8 @@ def test_silent_explorer_is_told_and_its_numbers_are_marked_until_it_answers(tab
 
 def test_page_asks_an_explorer_that_has_nothing_to_say(tab: Tab) -> None:
     tab.settle()
-    assert tab.page.evaluate(ANSWER, 5_000) == "message_batch"
+    wait_in_vain(tab, PAUSE)
+    assert tab.page.evaluate(ANSWER, 1000.0 * PAUSE) == "message_batch"
     expect(lost(tab)).to_have_count(0)
 
 
@@ -99,7 +111,7 @@ def test_page_connects_anew_to_an_explorer_that_stays_silent(
         tab.settle()
         before = set(running.viser.get_clients())
         with suspended(running):
-            tab.page.evaluate(ADVANCE, 30_000)
+            wait_in_vain(tab, 35.0)
         tab.wait_for(lambda: bool(set(running.viser.get_clients()) - before), "a connection")
         expect(lost(tab)).to_have_count(0)
         expect(tab.label("y")).to_be_visible()

@@ -41,7 +41,8 @@ window.explorer.connection ??= (() => {
     if (looks >= ASK && !isClosed) send(inbox, (questions += 1));
     if (looks % CONNECT === 0) socket.connect();
     show();
-    clock.after(PAUSE, look, true);
+    // What has come is heard before the next pause begins.
+    setTimeout(() => clock.after(PAUSE, look, true));
   };
   look();
   return (uuid, saved) => {
