@@ -6,6 +6,10 @@ e_i within ±b_i fill a zonotope, whose farthest vertex is the exact worst error
 
 Errors are independent, and each is uniform within ± its bound, as those of the machines that
 `explorer.prototype.imperfect` draws. Root-mean-square errors are those of this model.
+
+No source is the squareness of struts 2 and 3 to the guide: an angle ε between a strut and the plane
+across the guide has the effect of an error of d1 by d2 ε, or of d3 by d4 ε. Play in the joints and
+the straightness of the guide are left out, too.
 """
 
 from __future__ import annotations
@@ -32,6 +36,11 @@ UNIFORM = 1.0 / math.sqrt(3.0)
 
 RMS_ERRORS = "independent errors, each uniform within its bounds"
 """The errors behind each root-mean-square error, in words."""
+
+NO_SOURCES = (
+    "squareness of struts 2 and 3 to the guide, play in the joints, straightness of the guide"
+)
+"""Errors of a machine that are no sources, in words."""
 
 # Corners of the cube of the actuators' errors, up to a common sign.
 CORNERS = 32

@@ -1,8 +1,10 @@
 """Compliance of the tool: how far a load moves it, and what gives way.
 
 C = J⁻¹ diag(c) J⁻ᵀ with c = 1 / k for each actuator. The struts of legs 2 and 3 are cantilevers on
-their carriages: they add d2³ / 3EI to c(d1) and d4³ / 3EI to c(d3). The model is linear about the
-unloaded pose and has no preload terms, which matter only if forces approach stiffness × length.
+their carriages: they add d2³ / 3EI to c(d1) and d4³ / 3EI to c(d3). All else is rigid, see `RIGID`;
+what rods and joints give along a leg can be part of its actuator's stiffness. The model is linear
+about the unloaded pose and has no preload terms, which matter only if forces approach stiffness ×
+length.
 """
 
 from __future__ import annotations
@@ -19,6 +21,9 @@ from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray, finite_array, lengths_of, positive_array
 from explorer.numerics.compiled import helper, kernel
 from explorer.statics.forces import B2, B3, load_array, twists_of_actuators
+
+RIGID = "joints, carriages, guide, platform and base"
+"""What counts as rigid, in words."""
 
 # Number of halvings, of the logarithm where it can be, that find the worst force to rounding.
 HALVINGS = 70

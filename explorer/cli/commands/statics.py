@@ -164,8 +164,9 @@ class Accuracy(options.TypicalOptions, LoadOptions):
     """Compute the errors and the deflection of the tool in a pose.
 
     Errors, stiffness, struts and tolerances are those of the design; a design without them is
-    exact and rigid. The model is linear, without preload. RMS errors are those of independent
-    errors, each uniform within its bounds.
+    exact and rigid. The model is linear, without preload, and joints, carriages, guide, platform
+    and base are rigid. Squareness of the struts to the guide, play and straightness of the guide
+    are no errors of it. RMS errors are those of independent errors, each uniform within its bounds.
     """
 
     errors: Annotated[values.OfActuators, values.OF_DESIGN] = None

@@ -10,9 +10,9 @@ import numpy as np
 from explorer.measures.blocks import block
 from explorer.mechanism.design import JOINTS
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import IS_TILT, RMS_ERRORS, SOURCES
+from explorer.statics.accuracy import IS_TILT, NO_SOURCES, RMS_ERRORS, SOURCES
 from explorer.statics.budget import PARTS, SourceCosts, ToleranceBudget
-from explorer.statics.compliance import is_elastic
+from explorer.statics.compliance import RIGID, is_elastic
 from explorer.statics.loaded import GROUPS, ToolPrecision
 
 DIGITS = 3
@@ -56,7 +56,8 @@ def tool_errors(precision: ToolPrecision, listed: int | None = LISTED) -> Iterat
             block.Column("turn", turned, "°", DIGITS),
         ),
         "Displacement of the tool point, and turn of the tool. Worst: the largest for all signs "
-        f"of the errors, each at its largest. RMS: root mean square of {RMS_ERRORS}.",
+        f"of the errors, each at its largest. RMS: root mean square of {RMS_ERRORS}. "
+        f"Left out: {NO_SOURCES}.",
     )
     yield from _sources(precision, listed)
 
@@ -133,7 +134,8 @@ def deflections(
         most = block.Number(unit * precision.largest_displacement, " mm", DIGITS)
         hint = "The payload's force acts besides, in the direction that deflects the tool most."
         facts.append(block.Fact("with the payload's force", ("at most ", most), hint=hint))
-    yield block.Facts("Deflection", facts, f"Displacement and turn of the tool under {load}.")
+    words = f"Displacement and turn of the tool under {load}. Rigid: {RIGID}."
+    yield block.Facts("Deflection", facts, words)
     shares = [float(share) for share in precision.shares]
     if not np.isnan(shares).any():
         yield block.Split(
