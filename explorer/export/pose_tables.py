@@ -306,8 +306,8 @@ class TableAnswer(NamedTuple):
 
 def inverse_answer(table: Table, poses: Configuration, at: Point = "b4") -> TableAnswer:
     """Return the joints of the poses of a table, and which limits each violates."""
-    count = len(table.rows)
-    return _answer(table, np.arange(count), poses, poses.joints, np.ones(count, np.bool_), at)
+    rows, closes = np.arange(len(table.rows)), np.ones(len(table.rows), np.bool_)
+    return _answer(table, (rows, mode_of(poses.margins)), poses, poses.joints, closes, at)
 
 
 def forward_answer(
@@ -320,23 +320,23 @@ def forward_answer(
     modes = kinematics.forward(design, joints)
     given, mode = np.nonzero(modes.feasible[:, None] | (np.arange(8) == 0))
     poses = Configuration(design, modes.position[given, mode], modes.rotation[given, mode])
-    return _answer(table, given, poses, joints, modes.feasible, at)
+    return _answer(table, (given, mode), poses, joints, modes.feasible, at)
 
 
 def _answer(
     table: Table,
-    given: IntArray,
+    numbers: tuple[IntArray, IntArray],
     poses: Configuration,
     joints: FloatArray,
     closes: BoolArray,
     at: Point,
 ) -> TableAnswer:
-    """Return the answer for joints (n, 6), with the index of each pose's line in the table, (m,).
+    """Return the answer for joints (n, 6) and poses, given the line and the mode of each, (m,).
 
     Joints that do not close have one pose, which is left out.
     """
-    mode, (words, kind, broken) = mode_of(poses.margins), _verdicts(poses)
-    heads, numbers = _columns(poses, len(given), at)
+    (given, mode), (words, kind, broken) = numbers, _verdicts(poses)
+    heads, columns = _columns(poses, len(given), at)
     time = [name for name in ("time",) if name in table.columns]
     known = np.hstack([table.numbers(*time), joints]).tolist()
     starts = [
@@ -344,7 +344,7 @@ def _answer(
     ]
     rows: list[str] = []
     for index, number, row, which in zip(
-        given.tolist(), mode.tolist(), numbers.tolist(), kind.tolist(), strict=True
+        given.tolist(), mode.tolist(), columns.tolist(), kind.tolist(), strict=True
     ):
         if closes[index]:
             values = ",".join([str(number), *map(repr, row), "false" if words[which] else "true"])

@@ -73,6 +73,8 @@ def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     sines, cosines = np.empty((2, count, 5))
     write_angles(count, positions, rotations, coordinates, sines, cosines)
     np.arctan2(sines, cosines, out=coordinates[:, 1:])
+    # Just above −π, a fold may be rounded to it.
+    np.abs(coordinates, out=coordinates, where=coordinates == -np.pi)
     return coordinates.reshape(*batch, 6)
 
 

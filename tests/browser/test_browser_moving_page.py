@@ -93,6 +93,10 @@ def test_moving_page_has_the_numbers_of_python(page: Page, tmp_path: Path, seed:
     turns = np.reshape([each["rotation"] for each in poses], (-1, 3, 3))
     assert_allclose(turns, rotations, rtol=0, atol=SHARE)
 
+    half_turns = from_folds(folds * [1, 1, 1, 0, 0, 0] + [0, 0, 0, -np.pi, -np.pi, -np.pi])
+    flat_rows = np.concatenate([half_turns[0], half_turns[1].reshape(-1, 9)], axis=1).tolist()
+    assert (np.array(call(page, f"row => m.toFolds({pose})", flat_rows)) > -np.pi).all()
+
     # Of flat poses all legs are in one plane; axes that cross are apart by rounding.
     flat = from_folds(folds[:50] * [1, 1, 1, 0, 0, 0])
     near = poses_about_home(design, COUNT, seed)

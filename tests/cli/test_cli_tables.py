@@ -181,6 +181,19 @@ def test_joints_that_do_not_close_are_told_and_the_others_answered(
     assert rows[8]["violations"] == "the lengths do not close"
 
 
+def test_modes_of_singular_joints_are_numbered_as_those_of_others() -> None:
+    places = [[10.0, 5.0, 9.0], [10.0, 5.0, 0.0], [0.0, 0.0, 0.0]]
+    turns = rotation_from_yaw_pitch_roll([[-73.0, 5.0, 3.0]] * 3)
+    joints = explorer.inverse(PRESET, places, turns)
+    lines = [",".join(map(repr, row)) for row in joints.tolist()]
+    text = "\n".join(["l1,d1,d2,d3,d4,l4", *lines])
+    table = tables.parse_table("joints.csv", text.encode(), PRESET.unit_mm)
+    rows = rows_of(tables.forward_answer(table, PRESET, joints))
+    assert [(row["line"], row["mode"]) for row in rows] == [
+        (str(line), str(mode)) for line in (2, 3, 4) for mode in range(8)
+    ]
+
+
 def test_first_line_outside_is_told_with_all_that_it_violates() -> None:
     answer = answer_to("x_mm,y_mm,z_mm\n100,50,90\n300,50,90\n110,50,90")
     assert (answer.lines, answer.closing, answer.within) == (3, 3, 2)

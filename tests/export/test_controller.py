@@ -16,7 +16,7 @@ from long_cases import long_after
 from numpy.testing import assert_allclose, assert_array_equal
 from reference import read_reference
 
-from explorer import PRESETS, Design, forward, inverse, jacobian, margins, to_folds
+from explorer import PRESETS, Design, forward, from_folds, inverse, jacobian, margins, to_folds
 from explorer.export.controller import LIMIT_NAMES, kernel_files
 from explorer.legs.clearance import PAIRS
 from explorer.mechanism.configuration import Configuration
@@ -63,6 +63,8 @@ def test_kernel_equals_python(seed: int, tmp_path: Path) -> None:
     assert_allclose(found, margins(*poses), rtol=0, atol=SHARE * size)
     assert_array_equal(modes, mode_of(found))
     assert_allclose(kernel.folds(*poses), to_folds(*poses), rtol=SHARE, atol=SHARE)
+    flat = from_folds(to_folds(*poses) * [1, 1, 1, 0, 0, 0] + [0, 0, 0, -np.pi, -np.pi, -np.pi])
+    assert (kernel.folds(*flat) > -np.pi).all()
 
     # Joints that do not close, and those of poses with folds that are flat to rounding.
     joints[::7] *= np.random.default_rng(seed).uniform(0.5, 1.5, (len(joints[::7]), 6))

@@ -103,6 +103,19 @@ def test_poses_near_the_walls_come_back(flat: float) -> None:
     assert_allclose(again[1], rotation, rtol=0, atol=1e-12)
 
 
+def test_folds_that_are_flat_to_rounding_are_above_minus_a_half_turn() -> None:
+    flat = np.round(random_folds(100_000, 5) / math.pi) * math.pi
+    given = np.where(
+        np.random.default_rng(5).random(flat.shape) < 0.4, flat, random_folds(100_000, 6)
+    )
+    given[:, :3] = random_folds(100_000, 6)[:, :3]
+    position, rotation = from_folds(given)
+    folds = to_folds(position, rotation)[:, 3:]
+    assert (folds == math.pi).sum() > 1000
+    assert (folds > -math.pi).all()
+    assert (folds <= math.pi).all()
+
+
 @pytest.mark.parametrize("turn", range(24))
 def test_poses_of_lower_strata_come_back_with_the_chosen_coordinates(turn: int) -> None:
     rotation = QUARTER_TURNS[turn]

@@ -81,9 +81,15 @@ window.flagged44 = (design) => {
     });
     const se = Math.sqrt(u[1] * u[1] + u[2] * u[2]);
     const [c2, s2] = se > 0 ? [u[1] / se, (0 - u[2]) / se] : [1, 0];
-    const phi1 = Math.atan2(0 - (s2 * v[1] + c2 * v[2]), s2 * n[1] + c2 * n[2]);
-    const beta = Math.atan2(sb, cb);
-    return [r, beta, Math.atan2(se, u[0]), phi1, Math.atan2(s2, c2), Math.atan2(s3, c3)];
+    const angles = [
+      [sb, cb],
+      [se, u[0]],
+      [0 - (s2 * v[1] + c2 * v[2]), s2 * n[1] + c2 * n[2]],
+      [s2, c2],
+      [s3, c3],
+    ].map(([sine, cosine]) => Math.atan2(sine, cosine));
+    // Just above −π, a fold may be rounded to it.
+    return [r, ...angles.map((angle) => (angle > -Math.PI ? angle : Math.PI))];
   };
 
   // The folds of joints, with φ1, φ2 and φ3 from 0 to π: their signs are those of the mode. Null
