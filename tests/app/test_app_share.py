@@ -142,7 +142,7 @@ def test_caption_of_a_scene_page_has_names_as_text() -> None:
     [(15, 100, "width"), (100, 4097, "height"), (float("nan"), 100, "width"), (64, -1, "height")],
 )
 def test_picture_size_out_of_bounds_is_refused(width: float, height: float, named: str) -> None:
-    with pytest.raises(InputError, match=rf"^the {named} of a picture is 16 to 4096 pixels; got"):
+    with pytest.raises(InputError, match=rf"^the {named} of a picture is 16 to 4,096 pixels; got"):
         picture_size(Mock(), (width, height))
     assert picture_size(Mock(), (LEAST, MOST)) == (LEAST, MOST)
     assert picture_size(Mock(), (99.6, 100.2)) == (100, 100)

@@ -79,5 +79,5 @@ def test_picture_of_an_impossible_size_is_refused_to_the_tab_that_asks_alone(
         while not any("pixels; got 9" in text for _, text in notices(messages)):
             messages += client.read()
         (text,) = (text for _, text in notices(messages) if "got 9" in text)
-        assert "the width of a picture is 16 to 4096 pixels; got 9" in text
+        assert "the width of a picture is 16 to 4,096 pixels; got 9" in text
         assert not any("got 9" in text for _, text in notices(other.read_all_sent(running)))
