@@ -24,6 +24,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.number_text import format_apart
 from explorer.paths.time_law import PLATFORM, Intervals, TimeLaw, Travel
 from explorer.statics.forces import forces_of
 from explorer.statics.weights import MovingBodies, carry
@@ -71,11 +72,11 @@ class Bounds(NamedTuple):
         used = np.maximum(at_rest / push, -at_rest / pull)
         if used.max(initial=0.0) >= 1.0:
             place = np.unravel_index(used.argmax(), used.shape)
-            force = abs(at_rest[place])
+            force = abs(float(at_rest[place]))
+            needed, limit = format_apart((force, force / float(used[place])), 4)
             raise NoAnswerError(
-                f"the platform cannot rest everywhere on the path: at rest the actuator of "
-                f"{JOINTS[int(place[-1])]} needs {force:.4g} N, and its limit is "
-                f"{force / used[place]:.4g} N"
+                "the platform cannot rest everywhere on the path: at rest the actuator of "
+                f"{JOINTS[int(place[-1])]} needs {needed} N, and its limit is {limit} N"
             )
         slope, curvature = (each[:, :PLATFORM] for each in travel.derivatives(number, share))
         even = np.broadcast_to(acceleration, slope.shape)

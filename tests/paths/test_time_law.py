@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 
@@ -339,6 +340,25 @@ def test_law_passes_a_pose_in_which_all_actuators_rest() -> None:
     assert (np.diff(motion.share) > 0.0).all()
     rates = np.abs(np.diff(joints_at(law, times), axis=0)).max(axis=1) / np.diff(times)
     assert_allclose(np.sort(rates)[2:], 1.0, rtol=1e-3)
+
+
+def test_force_at_rest_just_beyond_its_limit_is_told_with_digits_that_differ() -> None:
+    def words(force: float) -> str:
+        try:
+            law_of_shortest_time(limited(1.0, 1.0, force), ALONG_GUIDE)
+        except NoAnswerError as error:
+            return str(error)
+        return ""
+
+    needed = float(words(1.0).partition("needs ")[2].split()[0])
+    weak, strong = 0.999 * needed, 1.001 * needed
+    assert words(weak)
+    assert not words(strong)
+    while strong - weak > 1e-7 * needed:
+        middle = 0.5 * (weak + strong)
+        weak, strong = (middle, strong) if words(middle) else (weak, middle)
+    force, limit = re.findall(r"([\d.]+) N", words(weak))
+    assert force != limit
 
 
 def test_law_without_a_limit_or_a_mass_is_refused_in_a_sentence() -> None:

@@ -23,7 +23,7 @@ import msgspec
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_ascii, format_number
+from explorer.numerics.number_text import format_apart, format_ascii, format_number
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Iterate, Phase, Run, Status
 from explorer.optimise.problem import OVER_BOX, Problem
 from explorer.optimise.search.demands import MET
@@ -120,9 +120,10 @@ class Search:
     def _message(self, chosen: Attempt) -> str:
         demanded, largest = self.problem.demands.volume or 0.0, self.largest_volume
         if chosen.status == "infeasible" and 0.0 < largest < demanded:
+            asked, found = format_apart((demanded, largest), 6, format_number)
             return (
-                "no design within the bounds was found with a volume of "
-                f"{format_number(demanded, 6)}; the largest found is {format_number(largest, 6)}"
+                f"no design within the bounds was found with a volume of {asked}; the largest "
+                f"found is {found}"
             )
         return chosen.message or _default_message(self.problem, chosen, self.steps)
 
