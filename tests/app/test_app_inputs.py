@@ -132,8 +132,11 @@ def test_length_typed_in_mm_is_the_state_of_its_value_in_design_units(
     in_units = Set("view.lengths", "design units").apply(in_mm)
     bound = in_unit(item(lambda frame: frame.state.position, 0, SetPosition), 1)
     typed = float(value * Decimal(unit_mm))
-    after = bound.write(in_mm, typed).apply(in_mm)
-    assert after.pose == bound.write(in_units, float(value)).apply(in_units).pose
+    action, same = bound.write(in_mm, typed), bound.write(in_units, float(value))
+    assert action is not None
+    assert same is not None
+    after = action.apply(in_mm)
+    assert after.pose == same.apply(in_units).pose
     assert bound.read(Frame(after)) == typed
     # Neither the switch nor a value that is typed as it stands changes a bit.
     assert replace(in_units, view=in_mm.view) == in_mm
