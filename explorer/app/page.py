@@ -209,7 +209,9 @@ class Page:
         self.worker.start(then=prepare)
 
     def stop(self) -> None:
-        """End the session, the features and the worker."""
+        """End the session, the features and the worker; keep what long work has found so far."""
+        for runner in self.runners:
+            runner.finish()
         for pause in self.pauses:
             pause.cancel()
         self.buttons.stop()

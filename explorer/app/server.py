@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import logging
-import signal
 import socket
 import sys
 import threading
@@ -32,6 +31,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.compiled import warm_in_background
+from explorer.numerics.interruption import Interruption
 
 # Preset that is opened if there is no session to continue.
 FIRST_DESIGN = "paper-optimal"
@@ -172,8 +172,8 @@ def serve(
         name = user_data.history.step.state.design.name
         sys.stderr.write(f"Going on with {name!r} where it was left.\n")
     try:
-        with contextlib.suppress(KeyboardInterrupt):
-            _wait_for_interruption(running, open_browser)
+        with contextlib.suppress(KeyboardInterrupt), Interruption() as interruption:
+            _wait_for_interruption(running, open_browser, interruption)
         sys.stderr.write("Stopped.\n")
     finally:
         running.stop()
@@ -199,19 +199,10 @@ def start_log(folder: Path) -> None:
     logging.getLogger().addHandler(log)
 
 
-def _wait_for_interruption(running: Running, open_browser: bool) -> None:
+def _wait_for_interruption(
+    running: Running, open_browser: bool, interruption: Interruption
+) -> None:
     """Print the address of the page, start what it needs, and wait for an interruption."""
-    interrupted = threading.Event()
-
-    def interrupt(*_: object) -> None:
-        # The next Ctrl-C interrupts as usual.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        interrupted.set()
-
-    # Python would raise at any point, and an exception within a finaliser is lost. Where Ctrl-C is
-    # ignored, as in a background job, nothing changes.
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, interrupt)
     sys.stderr.write(f"{TITLE}: {running.url}   (Ctrl-C stops it)\n")
     access = running.access
     if not is_loopback(access.host):
@@ -230,7 +221,7 @@ def _wait_for_interruption(running: Running, open_browser: bool) -> None:
     if open_browser:
         threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()
     # Some systems handle signals only between two waits.
-    while not interrupted.wait(WAKE_SECONDS):
+    while not interruption.wait(WAKE_SECONDS):
         pass
 
 

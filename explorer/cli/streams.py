@@ -1,7 +1,5 @@
 """Standard output and standard error, robust against what they are connected to, and progress.
 
-A search that is interrupted from the terminal or by the system answers with what it has so far.
-
 Commands write through these functions only, so that a closed pipe, a full disk or a terminal
 without Greek letters causes no traceback. Progress goes to standard error: a bar in a terminal,
 elsewhere one line per second.
@@ -10,14 +8,11 @@ elsewhere one line per second.
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
 import time
 from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from io import TextIOWrapper
-from typing import Any
 
 from explorer.errors import ExplorerError
 
@@ -104,37 +99,3 @@ class Meter(AbstractContextManager["Meter"]):
             self._last_width = len(text)
         else:
             write_progress(text + "\n")
-
-
-class Interruption(AbstractContextManager["Interruption"]):
-    """Ctrl-C, SIGTERM or SIGHUP in a `with` block, for work that ends by itself when asked to.
-
-    A second signal has its usual effect, and one that is ignored, as Ctrl-C in a background job,
-    stays so.
-
-    Attributes:
-        is_asked: Whether a signal has come.
-    """
-
-    def __init__(self) -> None:
-        self.is_asked = False
-        self._usual: dict[int, Any] = {}
-
-    def __enter__(self) -> Interruption:
-        """Take the signals; only the main thread can."""
-        if threading.current_thread() is threading.main_thread():
-            # Windows has no SIGHUP, which comes where a terminal is closed.
-            known = (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
-            for number in filter(None, known):
-                if signal.getsignal(number) is not signal.SIG_IGN:
-                    self._usual[number] = signal.signal(number, self._ask)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Give the signals their usual effect again."""
-        while self._usual:
-            signal.signal(*self._usual.popitem())
-
-    def _ask(self, *_: object) -> None:
-        self.is_asked = True
-        self.__exit__()

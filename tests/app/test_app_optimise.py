@@ -10,12 +10,14 @@ import re
 import signal
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 import viser
+from client import wait_for
 from desk import Desk, number, rows_of
 from limited_designs import limited
 from sample_states import iterates_of
@@ -67,6 +69,7 @@ from explorer.app.features.optimise.work import (
     requested_box,
 )
 from explorer.app.features.prototype.building import BuildVerdict
+from explorer.app.server import start as start_page
 from explorer.app.session.session import UNDO
 from explorer.app.session.worker import Channel
 from explorer.app.state.actions import (
@@ -83,6 +86,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import set_unit
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View
+from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.box import corners_of
@@ -310,6 +314,27 @@ def test_cancel_ends_the_search_by_a_word_and_keeps_the_best_so_far(
     assert bench.search(SMALL, 1) == process
     bench.wait_for_end()
     assert bench.reports == []
+
+
+def test_search_under_way_is_kept_when_the_explorer_stops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
+    running = start_page(paper_start(), port=0, user_data=open_user_data(resume=True))
+    session = running.page.session
+    for action in (SetRequest("optimisation.request", ENDLESS), StartRun()):
+        session.do(action)
+    wait_for(lambda: len(getattr(Optimisation.of(session.state).run, "iterates", ())) >= 3)
+    running.stop()
+    resumed = open_user_data(resume=True)
+    assert resumed.history is not None
+    state = resumed.history.step.state
+    resumed.store.close()
+    run = run_of(state)
+    assert run.verdict is not None
+    assert (run.phase, run.verdict.status) == ("ended", "cancelled")
+    assert state.design.variables == best_of(run).design.variables
+    assert Revert().apply(state).design == paper_start()
 
 
 def test_killed_process_leaves_the_design_and_the_panel_says_so(bench: Bench) -> None:

@@ -160,8 +160,8 @@ def serve(*arguments: str) -> Generator[subprocess.Popen[str]]:
             process.kill()
 
 
-def assert_stops_quietly(process: subprocess.Popen[str]) -> None:
-    process.send_signal(signal.SIGINT)
+def assert_stops_quietly(process: subprocess.Popen[str], number: int = signal.SIGINT) -> None:
+    process.send_signal(number)
     out, rest = process.communicate(timeout=60)
     assert process.returncode in (0, 130)
     assert (out, rest) == ("", "Stopped.\n")
@@ -181,6 +181,15 @@ def test_serve_for_all_says_where_it_is_and_stops_quietly_when_interrupted() -> 
         assert more.startswith("Listening on 0.0.0.0: other machines open http://")
         assert f"?token={address['token']}; who has no token is refused." in more
         assert_stops_quietly(process)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there such signals end it at once")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_serve_that_the_system_ends_stops_quietly(name: str) -> None:
+    with serve() as process:
+        assert process.stderr is not None
+        process.stderr.readline()
+        assert_stops_quietly(process, getattr(signal, name))
 
 
 # The collector runs soon after the start, and what is raised within it is lost.

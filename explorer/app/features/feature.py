@@ -230,6 +230,10 @@ class Runner(ABC):
         """Start the process that the work will need, in the background."""
         return
 
+    def finish(self) -> None:
+        """End work whose result so far is kept, before the session ends."""
+        return
+
     def wait_until_idle(self, timeout: float) -> bool:  # noqa: ARG002 - some begin no work
         """Wait until the work that leads to a new frame is done; say whether it is."""
         return True

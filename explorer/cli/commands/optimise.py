@@ -13,7 +13,7 @@ from typing import Annotated
 import msgspec
 
 from explorer.cli import options, output, values
-from explorer.cli.streams import Interruption, Meter
+from explorer.cli.streams import Meter
 from explorer.errors import InputError, NoAnswerError
 from explorer.files.writing import check_writable
 from explorer.measures.catalogue import CATALOGUE, Measurements
@@ -21,6 +21,7 @@ from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
+from explorer.numerics.interruption import Interruption
 from explorer.optimise import conflicts, outcome as outcomes, solver
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import Box, ObjectiveName, Problem, Variable, with_box
@@ -133,7 +134,7 @@ class Optimise(options.JsonOptions, options.DesignOptions):
         problem, settings = self._problem()
         self._check_possible(problem)
         with Interruption() as interruption:
-            outcome = _search(problem, settings, lambda: interruption.is_asked)
+            outcome = _search(problem, settings, interruption.is_asked)
             is_kept = outcome.status in ("converged", "cancelled")
             files: dict[Path, bytes] = {}
             if self.out is not None and is_kept:

@@ -11,7 +11,7 @@ import threading
 import time
 
 from explorer.app.features.feature import Runner, Services
-from explorer.app.features.optimise.actions import Advance, Compare, EndRun
+from explorer.app.features.optimise.actions import Advance, CancelRun, Compare, EndRun
 from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import optimise
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
@@ -29,6 +29,8 @@ PACE, LONGEST = 0.07, 0.25
 STEPS = 25
 # Seconds after which the process of a cancelled search is ended.
 PATIENCE = 0.1
+# Seconds in which a search ends before the explorer does.
+LONGEST_END = 5.0
 
 # Seconds between two checks for the end of a search.
 WAIT_SECONDS = 0.02
@@ -75,12 +77,23 @@ class Optimiser(Runner):
         """Start the process of the searches."""
         self.worker.start()
 
+    def finish(self) -> None:
+        """Cancel a search that goes on, which keeps its best iterate."""
+        if self._session.state.optimisation.is_on:
+            self._session.do(CancelRun())
+            self._wait_for_end(time.monotonic() + LONGEST_END)
+            # The end is saved once it is drawn.
+            self._session.wait_until_idle(LONGEST_END)
+
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until a search and its comparison have ended; return whether they have."""
         deadline = time.monotonic() + timeout
+        self._wait_for_end(deadline)
+        return self.worker.wait_until_idle(deadline - time.monotonic())
+
+    def _wait_for_end(self, deadline: float) -> None:
         while self._session.state.optimisation.is_on and time.monotonic() < deadline:
             time.sleep(WAIT_SECONDS)
-        return self.worker.wait_until_idle(deadline - time.monotonic())
 
     def stop(self) -> None:
         """End the process and the thread that waits for it."""
