@@ -141,6 +141,23 @@ def test_start_screen_says_how_much_has_come_and_covers_the_page_until_all_is_th
         assert page.evaluate(TRANSFERRED) == 0
 
 
+@pytest.mark.parametrize(
+    ("path", "folder"),
+    [("/index.html", ""), ("/of/a/proxy", "/of/a/proxy"), ("/of/a/proxy/", "/of/a/proxy")],
+)
+def test_page_asks_for_that_of_viser_beside_itself(
+    browser: Browser, running: Running, path: str, folder: str
+) -> None:
+    # A proxy may have a path of its own before that of the explorer.
+    address = re.compile(f"^{re.escape(running.url + folder)}/viser\\.html")
+    with closing(browser.new_context()) as context:
+        page = context.new_page()
+        page.route(f"**{path}", lambda route: route.fulfill(response=route.fetch(url=running.url)))
+        page.route(address, lambda route: route.abort())
+        with page.expect_request(address):
+            page.goto(f"{running.url}{path}")
+
+
 def test_page_that_does_not_come_is_told_on_the_start_screen(
     browser: Browser, running: Running
 ) -> None:
