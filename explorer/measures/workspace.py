@@ -122,7 +122,7 @@ def _sizes() -> Iterable[Measure]:
     yield More(
         "volume",
         "volume",
-        "Volume of the workspace at the home's orientation: exact, or good to about 1e-4 where "
+        "Volume of the workspace at the home's orientation: exact, or good to about 10⁻⁴ where "
         "joints bound the swing of legs",
         lambda case: case.volume.volume,
         title="exact volume",
