@@ -6,8 +6,9 @@ import asyncio
 import contextlib
 import io
 import warnings
-from collections.abc import Callable, Generator
-from typing import Any
+from collections.abc import AsyncGenerator, Callable, Generator, Sequence
+from typing import Any, ClassVar
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import viser
 import viser.infra
@@ -19,8 +20,10 @@ from viser._messages import (
     ShareUrlRequest,
 )
 from viser.infra._async_message_buffer import AsyncMessageBuffer
+from viser.infra._messages import Message
 
 from explorer.app.browser.client_page import ClientPage
+from explorer.app.browser.sending import Sending
 from explorer.app.security import Serve
 from explorer.errors import ServerError
 
@@ -58,7 +61,7 @@ def start_viser(
         )
     server_internals: Any = server
     messages = server_internals._websock_server.get_message_buffer().message_from_id
-    page.count_messages = lambda: len(messages)
+    page.count_messages = lambda: len(Sending().backlog(tuple(messages.values())))
     return server
 
 
@@ -77,8 +80,26 @@ class _LoopEvent(asyncio.Event):
 
 
 class _Buffer(AsyncMessageBuffer):
+    """Messages to all browsers of a server, or to one of them."""
+
+    # What is sent to each browser, by its number, for each server by its loop.
+    _sendings: ClassVar[
+        WeakKeyDictionary[asyncio.AbstractEventLoop, WeakValueDictionary[int, Sending]]
+    ] = WeakKeyDictionary()
+
     def __init__(self, event_loop: asyncio.AbstractEventLoop, **options: Any) -> None:
         super().__init__(event_loop, message_event=_LoopEvent(), **options)
+
+    def window_generator(
+        self, client_id: int, backlog_done_message: Message | None = None
+    ) -> AsyncGenerator[Sequence[Message]]:
+        """Yield the messages to a browser as they become due, without those that it can wait for.
+
+        It may begin to wait for the messages to all browsers and for those to itself in any order.
+        """
+        windows = super().window_generator(client_id, backlog_done_message)
+        sendings = self._sendings.setdefault(self.event_loop, WeakValueDictionary())
+        return sendings.setdefault(client_id, Sending()).filtered(windows, backlog_done_message)
 
 
 @contextlib.contextmanager

@@ -367,7 +367,7 @@ window.explorer.labels ??= (() => {
 
   // Bodies that hide what is behind them.
   const bodies = () =>
-    nodes("MeshMessage", "BatchedMeshesMessage")
+    nodes("MeshMessage", "BatchedMeshesMessage", "IcosphereMessage")
       .filter(({ props }) => (props.opacity ?? 1) > 0.95 && !props.wireframe)
       .flatMap(({ name }) => page().nodeRefFromName[name] ?? []);
   const isHidden = (raycaster, objects, { place }) => {

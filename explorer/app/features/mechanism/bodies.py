@@ -283,7 +283,8 @@ class Flag:
     def __init__(self, scene: viser.SceneApi, root: str, deltas: tuple[int, int, int]) -> None:
         # Indices of the margins that colour the point, the line and the plane.
         self._deltas = deltas
-        self._point = scene.add_mesh_simple(f"{root}/flag/point", *shapes.sphere())
+        # Each browser makes its mesh.
+        self._point = scene.add_icosphere(f"{root}/flag/point", subdivisions=8)
         self._line = scene.add_mesh_simple(f"{root}/flag/line", *shapes.cylinder(), wxyz=ALONG_X)
         self._patch = shapes.Patch(scene, f"{root}/flag", opacity=PLANE_OPACITY)
 
