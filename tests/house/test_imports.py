@@ -28,6 +28,7 @@ ROOMS = (
     "statics",
     "workspace",
     "measures",
+    "proofs",
     "prototype",
     "paths",
     "optimise",
