@@ -19,11 +19,10 @@ warning value of its own, and the pose is near a singularity if any is below:
 - the inverse condition number of J, below 0.01 (`WARN_CONDITION` in `explorer.singularity.colours`,
   which the maps read too): the smallest change that makes J singular is this share of J (Eckart
   and Young); most changes of that size do not. It does not say how much forces and errors grow:
-  that is one over the smallest singular value
-  (`explorer.singularity.ellipsoids.singular_values`). J is singular only where a margin is zero,
-  but margins and distances do not bound its conditioning: in a nearly degenerate design, or far
-  from the base, it is low in every pose. It counts for the incidence with the least scaled margin
-  (`explorer.mechanism.kinematics.jacobian_factors`).
+  that is one over the smallest singular value (`Configuration.singular_values`). J is singular
+  only where a margin is zero, but margins and distances do not bound its conditioning: in a nearly
+  degenerate design, or far from the base, it is low in every pose. It counts for the incidence with
+  the least scaled margin (`explorer.mechanism.kinematics.jacobian_factors`).
 
 All warning values grow with the user's warning length.
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -53,7 +54,6 @@ APP_ROOMS = (
     "scene",
     "features.feature",
     "features",
-    "bar",
     "layout",
     "page",
     "server",
@@ -177,9 +177,19 @@ def test_modules_import_only_from_their_own_room_or_those_below() -> None:
             if is_above:
                 offenders.append(f"explorer.{module} imports {name} of a room above")
     assert not offenders, "\n".join(offenders)
+    # No room is empty.
     assert {rank(module, ROOMS) for module in MODULES} == set(range(len(ROOMS)))
+    of_app = (name.removeprefix("app.") for name in MODULES if name.startswith("app."))
+    assert {rank(module, APP_ROOMS) for module in of_app} == set(range(len(APP_ROOMS)))
     # What is read is the package, not nothing.
     assert "mechanism.design" in own_imports("mechanism.kinematics")
+
+
+def test_contributors_read_of_the_rooms_in_their_order() -> None:
+    page = (PACKAGE.parent / "CONTRIBUTING.md").read_text("utf-8")
+    rows = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|", page.partition("| room |")[2], re.MULTILINE)
+    told = [room for row in rows for room in re.findall(r"\w+", row)]
+    assert told == [room for room in ROOMS if (PACKAGE / room).is_dir()]
 
 
 def test_modules_and_features_import_themselves_in_no_circle() -> None:
