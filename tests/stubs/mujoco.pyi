@@ -1,3 +1,4 @@
+# pyright: reportIncompleteStub=false
 # MuJoCo's modules are compiled, and come without types.
 from typing import Any
 
