@@ -26,7 +26,6 @@ RINGS = {
         "workspace",
         "measures",
         "paths",
-        "proofs",
         "optimise",
         "prototype",
         "numerics",

@@ -29,7 +29,6 @@ ROOMS = (
     "statics",
     "workspace",
     "measures",
-    "proofs",
     "prototype",
     "paths",
     "optimise",
