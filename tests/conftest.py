@@ -26,6 +26,7 @@ RINGS = {
         "workspace",
         "measures",
         "paths",
+        "proofs",
         "optimise",
         "prototype",
         "numerics",

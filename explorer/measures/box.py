@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.configuration import Configuration
@@ -105,11 +106,13 @@ class BoxStatics:
         design: The manipulator.
         box: Lows and highs of the positions, in design units.
         rotation: Platform to base, shape (3, 3).
+        places: Further positions to evaluate, as shares of the box's edges, shape (k, 3).
     """
 
     design: Design
     box: tuple[Triple, Triple]
     rotation: FloatArray
+    places: ArrayLike = ()
 
     @cached_property
     def is_regular(self) -> bool:
@@ -118,8 +121,10 @@ class BoxStatics:
 
     @cached_property
     def positions(self) -> FloatArray:
-        """Nodes of the grid, shape (n, 3)."""
-        return box_nodes(self.box)
+        """Nodes of the grid and the further positions, shape (n, 3)."""
+        lows, highs = np.array(self.box)
+        further = lows + (highs - lows) * np.reshape(self.places, (-1, 3))
+        return np.vstack([box_nodes(self.box), further])
 
     @cached_property
     def configuration(self) -> Configuration:

@@ -37,8 +37,8 @@ from explorer.workspace.limits.region import box_of, mark_nodes, region_of
 
 # Tolerance of a least clearance, over the reach.
 DEFAULT_TOLERANCE = 1e-4
-# Number of cells on each axis at first, and the largest number of cells that a pair may have
-# left to divide; if more are left, the bound of the pair is the least bound of those cells.
+# Number of cells on each axis at first, and default of the largest number of cells that a pair may
+# have left to divide.
 FIRST_CELLS = 8
 MOST_CELLS = 10_000
 # Largest number of cells whose clearances are computed at once.
@@ -75,6 +75,7 @@ def least_clearances(
     only_least: bool = False,
     below: float = math.inf,
     margin: float = 0.0,
+    most: int = MOST_CELLS,
     before_each: Callable[[], None] = lambda: None,
 ) -> LeastClearances:
     """Return the least clearances in the constant-orientation workspace.
@@ -89,6 +90,8 @@ def least_clearances(
         below: Clearance, in design units, from which on none is resolved. A pair that is nowhere
             closer has the clearance inf; other pairs have positions strictly within limits.
         margin: Least |δ| of the positions that count, in design units.
+        most: Largest number of cells that a pair may have left to divide; if more are left, its
+            bound is the least one of those cells.
         before_each: Function that is called before each batch of cells; it may raise.
 
     Raises:
@@ -137,7 +140,7 @@ def least_clearances(
         low = np.maximum(distance - half, plane_distance)
         largest = (best - radii).min() + radii if only_least else best
         divides = is_open & (low < largest - resolution)
-        is_open = is_open & (divides.sum(axis=0) <= MOST_CELLS)
+        is_open = is_open & (divides.sum(axis=0) <= most)
         divides = divides & is_open
         settled = np.minimum(settled, np.where(divides, math.inf, low).min(axis=0, initial=np.inf))
         size = 0.5 * size

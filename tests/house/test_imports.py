@@ -29,6 +29,7 @@ ROOMS = (
     "statics",
     "workspace",
     "measures",
+    "proofs",
     "prototype",
     "paths",
     "optimise",

@@ -10,19 +10,27 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.measures.box import box_margins, corners_of
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.margins import SINGULAR, margins, planes_of_singularity
-from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
-from explorer.numerics.arrays import BoolArray, FloatArray, lengths_of
+from explorer.numerics.arrays import BoolArray, FloatArray, dot, lengths_of
 from explorer.optimise.problem import SHIFTS, distances_of
-from explorer.optimise.search.state import State
-from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
+from explorer.optimise.search.state import NOWHERE, State
+from explorer.proofs.limits import AXES_OF_LEGS, BoxLimits, End, prove_limits, tilted_rotations
+from explorer.proofs.proof import Proof
+from explorer.workspace.limits import quantities
+from explorer.workspace.limits.constraints import YAW, apex_of, line_of
 from explorer.workspace.limits.table import GAP
 
 # Tolerance of a demand that is no limit, dimensionless.
 MET = 1e-8
+# What a demand over many poses must have to spare in those of them that a search looks at, so that
+# their neighbours keep it too; dimensionless, and larger than the tolerance.
+RESERVE = 3e-8
+CORNERS = corners_of(((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)))
+"""The corners of a box as shares of its edges, shape (8, 3)."""
 
 
 class Measured(NamedTuple):
@@ -39,15 +47,25 @@ class Demand(ABC):
         names: Name of each condition.
         is_equality: Whether the values must be zero, rather than at least zero.
         is_limit: Whether it is a limit of the design, with the tolerance of all limits.
+        places: Places in the required box at which statics are evaluated, shape (k, 3).
     """
 
     names: tuple[str, ...] = ()
     is_equality = False
     is_limit = False
+    places = NOWHERE
 
     @abstractmethod
     def measure(self, state: State) -> Measured:
         """Return the values and their derivatives."""
+
+    def find_unproven(self, state: State) -> list[Proof]:
+        """Return what is not proven at a state, and look at its poses too from now on.
+
+        There is nothing to prove of a demand that `measure` decides exactly.
+        """
+        del state
+        return []
 
 
 class VolumeDemand(Demand):
@@ -127,84 +145,145 @@ def _gap(state: State) -> float:
     return (state.design.b3 - state.design.b2) * float(state.rotation[0, 0])
 
 
+class Look(NamedTuple):
+    """A tilt at which a limit over a box is looked at, angles in degrees.
+
+    Attributes:
+        corner: Corner of the box, (3,) of 0 and 1, where more than one of them may be the worst.
+        azimuth: Azimuth from home's yaw.
+        tilt: Tilt.
+        window: Half of the window about the azimuth in which the worst one counts.
+    """
+
+    corner: FloatArray
+    azimuth: float = 0.0
+    tilt: float = 0.0
+    window: float = 0.0
+
+
 class BoxDemand(Demand):
-    """A required box within the workspace.
+    """A required box within the workspace, at home's orientation and at all tilts up to one.
 
     A box whose corners lie within a convex limit lies within it; for a half-space the worst corner
     decides. A least length keeps the box outside a ball: there the point of the box nearest to the
     centre decides.
+
+    A search looks at the worst azimuth of the whole tilt in each of `SECTORS`, and, once a limit
+    was missed, about the tilt where it was. Azimuths turn with the yaw of home, so that a change of
+    the yaw turns all orientations about the base's z-axis.
     """
 
     is_limit = True
 
-    def __init__(self, start: State) -> None:
-        # The gap is the same in every position, and demanded by `GapDemand`.
-        self.counts: dict[str, int] = {}
-        for limit in start.limits:
-            if isinstance(limit, BallOrCylinder) and limit.inside:
-                self.counts[limit.name] = 8 if limit.is_ball else 4
-            elif limit.name != GAP:
-                self.counts[limit.name] = 1
-        named = [[name] * count for name, count in self.counts.items()]
-        self.names = tuple(f"required box within {name}" for names in named for name in names)
+    def __init__(self, start: State, tilt: float | None) -> None:
+        self.tilt = tilt
+        over = BoxLimits(start.design, start.box)
+        self.looks: dict[str, list[Look]] = {}
+        for end in over.ends:
+            # At home's orientation `GapDemand` demands what is the same in every position.
+            is_of_carriages = end.quantity == quantities.ORDER
+            self.looks[end.name] = [] if is_of_carriages else [*map(Look, _corners(end))]
+            for sector in range(SECTORS if tilt is not None and over.rate(end) > 0.0 else 0):
+                self._look(end, 360.0 * sector / SECTORS, tilt or 0.0, 180.0 / SECTORS)
+        self._name()
+
+    def _look(self, end: End, azimuth: float, tilt: float, window: float) -> None:
+        self.looks[end.name] += [Look(each, azimuth, tilt, window) for each in _corners(end)]
+
+    def _name(self) -> None:
+        self.names = tuple(
+            f"required box within {name}" + (f", tilted by {look.tilt:.6g}°" if look.tilt else "")
+            for name, looks in self.looks.items()
+            for look in looks
+        )
 
     def measure(self, state: State) -> Measured:
-        """Return the slacks of the points that decide on each limit, over the size."""
-        size, n = state.problem.size, len(state.u)
-        values: list[FloatArray] = []
-        gradients: list[FloatArray] = []
-        for name, count in self.counts.items():
-            if limit := state.regions.get(name):
-                value, by_u, by_p = _slack_of_box(state, limit)
-                for axis, shift in enumerate(SHIFTS):
-                    by_u = by_u + np.outer(by_p[:, axis], state.along({shift: 1.0}))
-                values.append(value / size)
-                gradients.append(by_u / size)
-            else:
-                # No position keeps this limit.
-                values.append(np.full(count, -1.0))
-                gradients.append(np.zeros((count, n)))
-        return Measured(np.concatenate(values), np.vstack(gradients))
+        """Return the slacks that are looked at, over the size; with a tilt, less a reserve."""
+        over, size = BoxLimits(state.design, state.box), state.problem.size
+        ends = {end.name: end for end in over.ends}
+        measured = [
+            _slacks_of(over, ends[name], looks, state)
+            for name, looks in self.looks.items()
+            if looks
+        ]
+        values, gradients = zip(*measured, strict=True)
+        reserve = 0.0 if self.tilt is None else RESERVE
+        return Measured(np.concatenate(values) / size - reserve, np.vstack(gradients) / size)
+
+    def find_unproven(self, state: State) -> list[Proof]:
+        """Return the limits that are missed, or not proven, at a tilt, and look there for each."""
+        if self.tilt is None:
+            return []
+        ends = {end.name: end for end in BoxLimits(state.design, state.box).ends}
+        proofs = prove_limits(state.design, state.box, state.rotation, self.tilt)
+        found = [proof for proof in proofs if not proof.is_proven]
+        for proof in found:
+            azimuth, tilt = proof.place.tolist()
+            self._look(ends[proof.name], azimuth - state.yaw, tilt, WINDOW)
+        self._name()
+        return found
 
 
-def _slack_of_box(
-    state: State, limit: BallOrCylinder | HalfSpace
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what `State.slack` does at the deciding points of the required box."""
-    corners = corners_of(state.box)
-    if isinstance(limit, HalfSpace):
-        worst = int((corners @ limit.normal).argmax())
-        return state.slack(limit, corners[worst : worst + 1])
-    if limit.inside:
-        # To a cylinder along x both ends along x are the same.
-        return state.slack(limit, corners if limit.is_ball else corners[::2])
-    lows, highs = np.array(state.box)
-    centre = limit.centre.copy()
-    if not limit.is_ball:
-        centre[0] = 0.5 * (lows[0] + highs[0])
-    return state.slack(limit, np.clip(centre, lows, highs)[None, :])
+# Sectors of azimuths in which a search looks at the worst one, and half of the window about one
+# that was missed, in degrees.
+SECTORS, WINDOW = 4, 15.0
+# Number of azimuths tried in a window, and distances of three through which parabolas lead to the
+# worst one, over the distance of those.
+TRIED, NEARER = 9, (1.0, 0.25, 0.06, 0.004)
 
 
-class TiltDemand(Demand):
-    """The required box within the workspace of one tilted orientation.
+# Quantities whose gradient by the position turns with the platform.
+TURNING = (quantities.DELTA1, quantities.DELTA2)
 
-    The azimuth, in degrees, turns with the yaw of home, so that a change of the yaw turns the
-    orientation about the base's z-axis, and its limits have the derivatives that they have at home.
+
+def _corners(end: End) -> FloatArray:
+    """Return the corners of a box, of 0 and 1, to look at for an end of a limit, (c, 3).
+
+    There is one if the worst position is the same, or moves smoothly, while azimuths change.
     """
+    if end.is_shortest or end.quantity not in (*range(quantities.L1, quantities.ANGLE), *TURNING):
+        return CORNERS[:1]
+    # To the legs on the guide, and for δ2, both ends along x are the same.
+    is_along = end.quantity not in (quantities.D2, quantities.D4, quantities.DELTA2)
+    return CORNERS if is_along else CORNERS[::2]
 
-    is_limit = True
 
-    def __init__(self, start: State, azimuth: float, tilt: float) -> None:
-        self.turn: FloatArray = rotation_from_tilt_torsion((azimuth, tilt, 0.0))
-        self.box, self.gap = BoxDemand(start.turn(self.turn)), GapDemand(start)
-        where = f", tilted by {tilt:g}° towards {azimuth:g}° from home's yaw"
-        self.names = tuple(f"{name}{where}" for name in (*self.box.names, *self.gap.names))
+def _slacks_of(over: BoxLimits, end: End, looks: list[Look], state: State) -> Measured:
+    """Return the slacks of an end of a limit at k looks, and their derivatives."""
+    corners = over.lows + np.array([look.corner for look in looks]) * (over.highs - over.lows)
+    tilts = np.array([(state.yaw + look.azimuth, look.tilt) for look in looks])
+    windows = np.array([look.window for look in looks])
 
-    def measure(self, state: State) -> Measured:
-        """Return the slacks of the box and of the gap of the carriages."""
-        tilted = state.turn(self.turn)
-        (box, box_slopes), (gap, gap_slopes) = self.box.measure(tilted), self.gap.measure(tilted)
-        return Measured(np.concatenate([box, gap]), np.vstack([box_slopes, gap_slopes]))
+    def decide(steps: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return orientations and positions at steps of the azimuths (k, m), and the slacks."""
+        offsets = np.stack(np.broadcast_arrays(steps, 0.0), axis=-1)
+        r = tilted_rotations(state.rotation, tilts[:, None] + offsets)
+        p = corners[:, None] if len(_corners(end)) > 1 else over.worst(end, r)
+        return r, p, over.slacks(end, r, p)
+
+    if windows.any():
+        steps = windows[:, None] * np.linspace(-1.0, 1.0, TRIED)
+        least = decide(steps)[2].argmin(axis=1)
+        tilts[:, 0] += steps[np.arange(len(looks)), least]
+        for share in NEARER:
+            step = share * 2.0 * windows / (TRIED - 1)
+            before, at, after = decide(step[:, None] * [-1.0, 0.0, 1.0])[2].T
+            bend, rise = before - 2.0 * at + after, 0.5 * (before - after)
+            shift = np.divide(rise, bend, out=np.sign(rise), where=bend > 0.0)
+            tilts[:, 0] += step * np.clip(shift, -1.0, 1.0)
+    r, p, slack = (each[:, 0] for each in decide([[0.0]]))
+    if end.leg is None:
+        by_position, _, rates = line_of(state.design, r, end.quantity)
+        by = {name: dot(rate[:, :3], p) + rate[:, 3] for name, rate in rates.items()}
+    else:
+        apex, rates = apex_of(state.design, r, end.leg)
+        leg = (p - apex) * AXES_OF_LEGS[end.leg]
+        by_position = leg / np.maximum(lengths_of(leg), 1e-300)[:, None]
+        by = {name: -dot(by_position, rate) for name, rate in rates.items()}
+    change = by_position @ state.rows(SHIFTS)
+    for name, values in by.items():
+        change += np.outer(values, state.along({name: 1.0}))
+    return Measured(slack, end.side * (state.along(end.bound.rates) - change))
 
 
 class MarginDemand(Demand):

@@ -6,17 +6,17 @@ outside the workspace or nearer to a singular plane than where clearance is dema
 (1979) and both from below: where the bound is not negative, every position satisfies it.
 A search looks between the positions afterwards.
 
-Loads, errors and deflections are evaluated at the nodes of a grid over the required box, see
-`explorer.measures.box`. Of the nodes of each eighth of the box the worst one counts, so that
-only a few values have gradients and most of them stay smooth from step to step. Towards a singular
-plane they may grow beyond all bounds, and beyond it they would fall again. So only the nodes on the
-box's own side of all planes count; that all of the box is there is an open `MarginDemand`.
+Loads, errors and deflections are looked at in the corners of the required box, and wherever between
+them they turned out to be larger. Towards a singular plane they may grow beyond all bounds, and
+beyond it they would fall again. So only the places on the box's own side of all planes count; that
+all of the box is there is an open `MarginDemand`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -27,12 +27,16 @@ from explorer.measures.measure import longest_leg
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.margins import margins
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.cells import CellValues
 from explorer.optimise.problem import SHIFTS, Problem
-from explorer.optimise.search.demands import Demand, MarginDemand, Measured
+from explorer.optimise.search.demands import CORNERS, RESERVE, Demand, MarginDemand, Measured
 from explorer.optimise.search.state import State
+from explorer.proofs.proof import Proof, proofs_of
+from explorer.proofs.statics import prove_deflection, prove_error, prove_load
 from explorer.statics import slopes
 from explorer.statics.reactions import LIMITED, part_limits
+from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
 
 # Number of first positions on each axis at which clearance is demanded; more follow where needed.
@@ -45,6 +49,9 @@ SHARPNESS = 60.0
 WEIGHT = 1e-12
 # Cap on slacks, as a multiple of the size of the start.
 FAR = 1e3
+
+# Tolerance of the proof of a clearance, over the clearance, and the most cells of a pair in it.
+PROVEN, MOST_CELLS = 1e-6, 100_000
 
 # The legs of each pair from 0.
 LEGS = np.array(PAIRS) - 1
@@ -122,6 +129,23 @@ class ClearanceDemand(Demand):
         pair = int(least.argmin())
         return float(least[pair]), self.names[pair]
 
+    def find_unproven(self, state: State) -> list[Proof]:
+        """Return the pairs that are, or may be, too near in the workspace, and look there too."""
+        least = least_clearances(
+            state.design,
+            state.rotation,
+            PROVEN * self.clearance,
+            below=(1.0 + PROVEN) * self.clearance,
+            margin=state.problem.demands.clearance_margin,
+            most=MOST_CELLS,
+        )
+        missed, bounds = (1.0 - each / self.clearance for each in least[:2])
+        found = CellValues(missed, least.position, bounds)
+        proofs = proofs_of(self.names, found, lambda _, place: (place, state.rotation))
+        attained = least.position[np.isfinite(least.clearance)]
+        self.positions = np.vstack([self.positions, attained])
+        return [proof for proof in proofs if not proof.is_proven]
+
     def _spare(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return axes of the legs, closest points, distances, and distances less the demanded."""
         p = self.positions
@@ -194,11 +218,12 @@ def _end_motions(state: State) -> FloatArray:
 PARTS = LIMITED[:10]
 """The loaded parts; the moment on the guide is the bending of the strut."""
 
-EIGHTHS = 8
-
-# Depth beyond a singular plane, over the size of the start, at which a box without a node on its
+# Depth beyond a singular plane, over the size of the start, at which a box without a place on its
 # side misses a demand by twice as much as on the plane.
 BEYOND = 0.05
+
+# Share by which a largest value between the nodes may exceed the one that is told.
+TOLD = 1e-6
 
 Cause = Literal["error", "deflection"]
 """What displaces the tool: the actuators' errors, or the design's load."""
@@ -217,111 +242,138 @@ def _spare(share: FloatArray, by: FloatArray) -> Measured:
     return Measured(spare_of(share), by * (-1.0 / np.maximum(1.0, share) ** 2)[:, None])
 
 
-def _worst_nodes(box: BoxStatics, values: FloatArray, counts: BoolArray) -> IntArray:
-    """Return the node with the largest of values (n, m) in each eighth of a box, shape (8, m).
+class StaticsDemand(Demand):
+    """What parts of the machine have everywhere in the required box must be at most something.
 
-    At least one node counts.
-    """
-    middle = np.mean(box.box, axis=0)
-    eighths = (box.positions > middle) @ np.array([4, 2, 1])
-    rows: list[IntArray] = []
-    for eighth in range(EIGHTHS):
-        # A box without depth along an axis has empty eighths.
-        members = np.flatnonzero(counts & (eighths == eighth))
-        members = members if len(members) else np.flatnonzero(counts)
-        rows.append(members[values[members].argmax(axis=0)])
-    return np.array(rows)
-
-
-class LoadDemand(Demand):
-    """The limits of actuators, struts and guide under the design's load, over the required box.
-
-    The load is the payload's weight and its force of any direction. The largest share of a limit
-    allowed is that at the start if none is given, so that the values are of unit size.
+    A search looks at the corners of the box, and where more was found later. If nothing is given,
+    the largest at the start is, so that the values are of unit size, and what is proven is that
+    nothing is larger than what is told.
     """
 
-    def __init__(self, start: State, most: float | None = None) -> None:
-        self.side = MarginDemand(start, is_open=True)
-        share = _scale_of(start, lambda box: box.utilisations) or 1.0 if most is None else most
-        self.limits = share * part_limits(start.design)
-        self.counts: BoolArray = np.asarray(np.isfinite(self.limits).any(axis=0))
-        self.names = tuple(
-            f"load of {part} over the required box"
-            for part, counts in zip(PARTS, self.counts, strict=True)
-            if counts
-            for _ in range(EIGHTHS)
-        )
+    def __init__(self, start: State, most: float | None, parts: Sequence[str]) -> None:
+        self.side, self.parts = MarginDemand(start, is_open=True), parts
+        self.most = most or _scale_of(start, self.amounts) or 1.0
+        self.is_given = most is not None
+        self.places = CORNERS
+        self.names = (*parts,) * len(self.places)
 
     def measure(self, state: State) -> Measured:
-        """Return what the largest shares of each part leave, see `spare_of`."""
-        box, counts = state.statics, self.side.keeps(state, state.statics.positions)
+        """Return what each part has to spare at each place, less a reserve; see `spare_of`."""
+        lows, highs = np.array(state.box)
+        positions = lows + self.places * (highs - lows)
+        counts, parts = self.side.keeps(state, positions), range(len(self.parts))
         if not counts.any():
             return _miss_beyond_plane(state, self.side, len(self.names))
-        shares = box.node_utilisations[:, : len(PARTS)].copy()
-        # The guide takes the bending of the struts as a moment, which may be closer to its limit.
-        shares[:, slopes.BENDING] = np.maximum(
-            shares[:, slopes.BENDING], box.node_utilisations[:, len(PARTS) :]
-        )
-        positions, parts = self._worst_parts(box, shares, counts)
-        twists = slopes.twist_slopes(state.design, positions, state.rotation)
-        share, by = slopes.share_slopes(state.design, state.rotation, twists, parts, self.limits)
+        found = self._spares(state, positions[counts])
+        spare, slopes = found.values.reshape(-1, len(parts)), found.gradients
+        slopes = slopes.reshape(*spare.shape, -1)
+        # A place beyond a plane counts as the worst of the others.
+        rows = np.tile(spare.argmin(axis=0), (len(positions), 1))
+        rows[counts] = np.arange(len(spare))[:, None]
+        values, gradients = spare[rows, parts], slopes[rows, parts]
+        return Measured(values.ravel() - RESERVE, gradients.reshape(-1, slopes.shape[-1]))
+
+    def find_unproven(self, state: State) -> list[Proof]:
+        """Return what is, or may be, too large in the required box, and look there too."""
+        most = self.most
+        if not self.is_given:
+            most = (1.0 + TOLD) * state.statics.worst(self.amounts(state.statics)) or most
+        found = [proof for proof in self._prove(state, most) if not proof.is_proven]
+        lows, highs = np.array(state.box)
+        edges = np.where(highs > lows, highs - lows, 1.0)
+        self.places = np.vstack([self.places, *((each.position - lows) / edges for each in found)])
+        self.names = (*self.parts,) * len(self.places)
+        return found
+
+    @abstractmethod
+    def amounts(self, box: BoxStatics) -> FloatArray:
+        """Return the values that are to be at most something, at the nodes of a box."""
+
+    @abstractmethod
+    def _spares(self, state: State, positions: FloatArray) -> Measured:
+        """Return what m parts have to spare at k positions, k · m values."""
+
+    @abstractmethod
+    def _prove(self, state: State, most: float) -> list[Proof]:
+        """Return the proofs that the values are at most something."""
+
+
+class LoadDemand(StaticsDemand):
+    """The limits of actuators, struts and guide under the design's load, over the required box.
+
+    The load is the payload's weight and its force of any direction. What is given is the largest
+    share of a limit.
+    """
+
+    def __init__(self, start: State, most: float | None = None, what: str = "load of") -> None:
+        limits = part_limits(start.design)
+        self.limited = np.flatnonzero(np.isfinite(limits).any(axis=0))
+        names = [f"{what} {PARTS[part]} over the required box" for part in self.limited.tolist()]
+        super().__init__(start, most, names)
+        self.limits = self.most * limits
+
+    def amounts(self, box: BoxStatics) -> FloatArray:
+        """Return the utilisations of all limits."""
+        return box.node_utilisations
+
+    def _rows(self, positions: FloatArray) -> tuple[IntArray, IntArray]:
+        """Return the position and the part of each value, as in `share_slopes`."""
+        count = len(positions)
+        return np.repeat(np.arange(count), len(self.limited)), np.tile(self.limited, count)
+
+    def _spares(self, state: State, positions: FloatArray) -> Measured:
+        design, rotation, parts = state.design, state.rotation, self._rows(positions)
+        twists = slopes.twist_slopes(design, positions, rotation)
+        share, by = slopes.share_slopes(design, rotation, twists, parts, self.limits)
         return _spare(share, by @ state.rows(CHAIN))
 
-    def _worst_parts(
-        self, box: BoxStatics, values: FloatArray, counts: BoolArray
-    ) -> tuple[FloatArray, tuple[IntArray, IntArray]]:
-        """Return positions, and as in `share_slopes` each part where its value is the largest.
-
-        It is the largest in each eighth of the box; the values have the shape (n, 10).
-        """
-        parts = np.flatnonzero(self.counts)
-        worst = _worst_nodes(box, values[:, parts], counts).T.ravel()
-        nodes, row = np.unique(worst, return_inverse=True)
-        return box.positions[nodes], (row, np.repeat(parts, EIGHTHS))
+    def _prove(self, state: State, most: float) -> list[Proof]:
+        return prove_load(state.design, state.box, state.rotation, most=most)
 
 
 class AccelerationDemand(LoadDemand):
     """The largest acceleration from rest that each part allows, over the required box, in m/s²."""
 
     def __init__(self, start: State, least: float) -> None:
-        super().__init__(start, 1.0)
+        super().__init__(start, 1.0, "acceleration by")
         self.least = least
-        self.names = tuple(name.replace("load of", "acceleration by", 1) for name in self.names)
 
-    def measure(self, state: State) -> Measured:
+    def _spares(self, state: State, positions: FloatArray) -> Measured:
         """Return v − 1 for accelerations of v times the least one; 1 − 1/v where v exceeds 1."""
-        box, counts = state.statics, self.side.keeps(state, state.statics.positions)
-        if not counts.any():
-            return _miss_beyond_plane(state, self.side, len(self.names))
-        positions, parts = self._worst_parts(box, -box.accelerations, counts)
+        parts = self._rows(positions)
         value, by = slopes.acceleration_slopes(state.design, positions, state.rotation, parts)
         value, by = value / self.least, by @ state.rows(CHAIN) / self.least
         above = np.maximum(1.0, value)
         return Measured(np.minimum(1.0, value) - 1.0 / above, by / (above**2)[:, None])
 
+    def _prove(self, state: State, most: float) -> list[Proof]:
+        box, rotation = state.box, state.rotation
+        return prove_load(state.design, box, rotation, most=most, acceleration=self.least)
 
-class DisplacementDemand(Demand):
+
+class DisplacementDemand(StaticsDemand):
     """The largest displacement of the tool by a cause over the required box, in design units."""
 
     def __init__(self, start: State, cause: Cause, most: float | None = None) -> None:
-        self.side = MarginDemand(start, is_open=True)
         self.cause: Cause = cause
-        self.most = most or _scale_of(start, lambda box: _displacements(box, cause))
-        self.names = (f"{cause} over the required box",) * EIGHTHS
+        super().__init__(start, most, [f"{cause} over the required box"])
 
-    def measure(self, state: State) -> Measured:
-        """Return what the largest displacements leave, see `spare_of`."""
-        box, design = state.statics, state.design
-        counts = self.side.keeps(state, box.positions)
-        if not counts.any():
-            return _miss_beyond_plane(state, self.side, len(self.names))
-        worst = _worst_nodes(box, _displacements(box, self.cause)[:, None], counts)[:, 0]
-        twists = slopes.twist_slopes(design, box.positions[worst], state.rotation)
+    def amounts(self, box: BoxStatics) -> FloatArray:
+        """Return the displacements."""
+        return box.errors.displacement if self.cause == "error" else box.deflections
+
+    def _spares(self, state: State, positions: FloatArray) -> Measured:
+        design, rotation = state.design, state.rotation
+        twists = slopes.twist_slopes(design, positions, rotation)
         if self.cause == "error":
             largest, by = slopes.error_slopes(design, twists)
         else:
-            largest, by = slopes.deflection_slopes(design, state.rotation, twists)
+            largest, by = slopes.deflection_slopes(design, rotation, twists)
         return _spare(largest / self.most, by @ state.rows(CHAIN) / self.most)
+
+    def _prove(self, state: State, most: float) -> list[Proof]:
+        prove = prove_error if self.cause == "error" else prove_deflection
+        return prove(state.design, state.box, state.rotation, most)
 
 
 def _miss_beyond_plane(state: State, side: MarginDemand, count: int) -> Measured:
@@ -344,7 +396,3 @@ def _scale_of(start: State, values: Callable[[BoxStatics], FloatArray]) -> float
         x, y, z = places[least.argmax()].tolist()
         box = BoxStatics(start.design, ((x, y, z), (x, y, z)), start.rotation)
     return float(values(box).max()) if box.is_regular else start.problem.size
-
-
-def _displacements(box: BoxStatics, cause: Cause) -> FloatArray:
-    return box.errors.displacement if cause == "error" else box.deflections

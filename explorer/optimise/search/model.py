@@ -16,9 +16,10 @@ import numpy as np
 from explorer.errors import DesignError
 from explorer.measures.box import box_margins
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.optimise.problem import AZIMUTHS, OF_THE_MACHINE, OVER_BOX, Problem
+from explorer.optimise.problem import OF_THE_MACHINE, OVER_BOX, Problem
 from explorer.optimise.search import demands, grid_demands
-from explorer.optimise.search.state import UNBOUNDED, State, bounds_of, scales
+from explorer.optimise.search.state import NOWHERE, UNBOUNDED, State, bounds_of, scales
+from explorer.proofs.proof import Proof
 
 MISSED = 1e3
 """Value of an objective that is not finite or of no design; with a minus, of such a demand."""
@@ -99,11 +100,21 @@ class Model:
         bounds = bounds_of(self.problem)
         return bounds if self._raised is None else np.vstack([bounds, UNBOUNDED])
 
-    def add_positions(self, positions: FloatArray) -> None:
-        """Demand clearance at more positions, shape (k, 3)."""
-        if self._clearance is not None:
-            self._clearance.positions = np.vstack([self._clearance.positions, positions])
+    def find_unproven(self, at: Evaluation) -> list[Proof]:
+        """Return what is not proven at a place, and look at its poses too from now on."""
+        found: list[Proof] = []
+        for demand in self.demands:
+            self._before_each()
+            found += demand.find_unproven(at.state)
+        for name in ("names", "equalities", "limits"):
+            self.__dict__.pop(name, None)
         self._last = None
+        return found
+
+    def unproven_clearance(self, at: Evaluation) -> list[Proof]:
+        """Return what is not proven of the clearance that a relaxed problem leaves out."""
+        left_out = self._clearance if self.is_relaxed else None
+        return left_out.find_unproven(at.state) if left_out else []
 
     def at(self, u: FloatArray) -> Evaluation:
         """Return the evaluation at scaled variables; the last one is remembered.
@@ -118,7 +129,8 @@ class Model:
 
     def _evaluate(self, u: FloatArray) -> Evaluation:
         self._before_each()
-        state = State(self.problem, u[: len(self.problem.names)])
+        places = np.vstack([demand.places for demand in self.demands] or [NOWHERE])
+        state = State(self.problem, u[: len(self.problem.names)], places)
         if not np.isfinite(u).all():
             raise DesignError("the solver tried a design that is not finite")
         # A problem may demand nothing.
@@ -217,10 +229,7 @@ def _demands(problem: Problem, start: State) -> list[demands.Demand]:
     if start.design.limits.gap > 0.0:
         listed.append(demands.GapDemand(start))
     if wanted.required_box is not None:
-        listed.append(demands.BoxDemand(start))
-    if wanted.tilt is not None:
-        azimuths = np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False).tolist()
-        listed += [demands.TiltDemand(start, azimuth, wanted.tilt) for azimuth in azimuths]
+        listed.append(demands.BoxDemand(start, wanted.tilt))
     machine: list[demands.Demand] = []
     if wanted.held:
         machine.append(grid_demands.LoadDemand(start, 1.0))

@@ -1,8 +1,9 @@
 """One run of the optimiser, from one start to an optimum or to a message that says why not.
 
 The solver's own verdict does not count: a volume must be matched, the conditions of an optimum
-must hold, and a clearance must be kept over the whole workspace, between the solver's positions
-too. A design is read from its file to the last bit.
+must hold, and what is demanded of a whole box, of all tilts or of the whole workspace must be
+proven between the solver's poses too. Where it is not, the worst pose joins them, and the search
+goes on. A design is read from its file to the last bit.
 
 Clearances divide the designs into regions: on the border between two of them legs cross, which
 no solver that follows slopes passes. Where a region holds no solution, the search continues in
@@ -31,16 +32,16 @@ from explorer.optimise.search.model import Evaluation, Model, reported_objective
 from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimality, solve
 from explorer.optimise.search.starts import open_workspace, promising_starts
 from explorer.optimise.search.state import State, scales
-from explorer.workspace.least_clearance import least_clearances
+from explorer.proofs.proof import Proof
 from explorer.workspace.slices.volume import find_emptying_limits
 
 # Largest F = |1 − V/V′| of a matched volume.
 MATCHED = 1e-10
 # A workspace below this share of the demanded volume is opened first.
 OPEN = 0.01
-# Number of times that an attempt continues, with more positions at which clearance is demanded or
-# once the volume is reached.
-ROUNDS = 8
+# Number of times that an attempt continues, with more poses at which demands are looked at or once
+# the volume is reached.
+ROUNDS = 30
 # An objective that changes by no more than this share within so many steps has settled.
 STILL_STEPS, STILL = 4, 1e-9
 # Attempts of a search with all its demands, and steps of an attempt to match a volume, for which
@@ -49,9 +50,6 @@ ATTEMPTS = 8
 STEPS_TO_MATCH = 40
 # Steps of the attempt without the clearance, for which an optimum takes a dozen or two.
 STEPS_WITHOUT_CLEARANCE = 60
-# Tolerance of a least clearance, over the clearance demanded: between positions at which it is
-# demanded, and where it is demanded nowhere.
-BETWEEN, ANYWHERE = 0.1, 0.001
 # Statuses after which a run makes no other attempt.
 ENDED = ("converged", "outdone", "cancelled")
 # Objectives that differ by less than this share are the same.
@@ -165,23 +163,25 @@ class Search:
         self.trail.see_opening(state, worst)
 
     def _solve(self, model: Model) -> Attempt:
-        at, missed, has_grown = model.at(model.start), np.zeros((0, 3)), False
+        at, missed, has_grown = model.at(model.start), list[Proof](), False
         is_done = False
         for _ in range(ROUNDS):
             before = self.steps
             at = self._feasible(model, self._sqp(model, at.u, "solving", self._may_end))
             is_done = self._is_done(model, at)
             if is_done:
-                missed = self._crossings(model, at)
-                if not len(missed):
-                    break
-                if model.is_relaxed:
+                holding = optimality(model, at).holding
+                missed = model.find_unproven(at)
+                if not missed:
+                    missed = model.unproven_clearance(at)
                     last = self.trail.last_at(at.state)
-                    if self._is_outdone(last):
-                        return Attempt("outdone", optimality(model, at).holding, "", last)
+                    if missed and self._is_outdone(last):
+                        return Attempt("outdone", holding, "", last)
                     break
-                model.add_positions(missed)
-                # Earlier iterates do not keep the clearance there.
+                at = model.at(at.u)
+                if all(proof.missed <= 0.0 for proof in missed):
+                    break
+                # Earlier iterates may miss what they were not asked for.
                 self.trail.begin()
             elif self.steps_left <= 0:
                 break
@@ -293,37 +293,17 @@ class Search:
             raise Stop
         return last
 
-    def _crossings(self, model: Model, at: Evaluation) -> FloatArray:
-        """Return positions at which the clearance is not kept after all, shape (k, 3)."""
-        demands, state = self.problem.demands, at.state
-        if demands.clearance is None:
-            return np.zeros((0, 3))
-        least = least_clearances(
-            state.design,
-            state.rotation,
-            (ANYWHERE if model.is_relaxed else BETWEEN) * demands.clearance,
-            below=demands.clearance,
-            margin=demands.clearance_margin,
-            before_each=self.trail.before_each,
-        )
-        return least.position[least.clearance < demands.clearance]
-
     def _verdict(
-        self, model: Model, at: Evaluation, missed: FloatArray, *, is_done: bool
+        self, model: Model, at: Evaluation, missed: list[Proof], *, is_done: bool
     ) -> Attempt:
         """Return the result of an attempt from its last place.
 
-        Legs are too near at the missed positions, shape (k, 3), if it solved the problem otherwise.
+        If it solved the problem otherwise, these demands are missed, or not proven.
         """
         spare, worst = model.worst(at)
         holding, best = optimality(model, at).holding, self.trail.best
-        if is_done and len(missed):
-            demanded = format_number(self.problem.demands.clearance or 0.0, 6)
-            words = (
-                f"a clearance of {demanded} is not kept everywhere, "
-                f"such as at ({', '.join(map(format_number, missed[0].tolist()))})"
-            )
-            return Attempt("not converged", "clearance", words, best)
+        if is_done and missed:
+            return Attempt("not converged", missed[0].name, _missed_words(missed[0]), best)
         if is_done:
             return Attempt("converged", holding, "", self.trail.last_at(at.state))
         if self.steps_left <= 0 or spare < 0.0 or self._is_short(at.state):
@@ -334,6 +314,16 @@ class Search:
             words = f"the workspace of the best design found is empty because of {because}"
             return Attempt("infeasible", because, words, best)
         return Attempt("stalled", holding, "", best)
+
+
+def _missed_words(proof: Proof) -> str:
+    """Return what is not proven as a message."""
+    place = f"({', '.join(map(format_number, proof.position.tolist()))})"
+    if proof.missed > 0.0:
+        return f"not converged: {proof.name} is not kept everywhere, such as at {place}"
+    return (
+        f"not converged: {proof.name} is kept wherever it was computed, but not proven at {place}"
+    )
 
 
 def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from explorer.measures.box import BoxStatics
 from explorer.mechanism.design import LENGTHS, Design
-from explorer.mechanism.pose import rotation_from_yaw_pitch_roll, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import REACH, YAW, Box, Problem
 from explorer.workspace.limits import constraints
@@ -38,11 +38,20 @@ def bounds_of(problem: Problem) -> FloatArray:
     return pairs / scales(problem)[:, None]
 
 
-class State:
-    """A problem at scaled variables (n,); each property is computed once."""
+NOWHERE = np.zeros((0, 3))
+"""No places."""
 
-    def __init__(self, problem: Problem, u: FloatArray) -> None:
+
+class State:
+    """A problem at scaled variables (n,); each property is computed once.
+
+    Loads, errors and deflections are evaluated at places in the required box too, as shares of its
+    edges, shape (k, 3).
+    """
+
+    def __init__(self, problem: Problem, u: FloatArray, places: FloatArray = NOWHERE) -> None:
         self.problem = problem
+        self.places = places
         self.u = u
         self.values: FloatArray = u * scales(problem)
 
@@ -56,13 +65,10 @@ class State:
         """The orientation of the workspace, shape (3, 3)."""
         return self.design.home_pose.rotation
 
-    def turn(self, turn: FloatArray) -> State:
-        """Return the same place with the orientation of home turned, along axes at its yaw."""
-        other, own = State(self.problem, self.u), self.rotation
-        other.design = self.design
-        yaw = rotation_from_yaw_pitch_roll((yaw_pitch_roll_from_rotation(own)[0], 0.0, 0.0))
-        other.rotation = yaw @ turn @ yaw.T @ own
-        return other
+    @cached_property
+    def yaw(self) -> float:
+        """The yaw of home, in degrees."""
+        return float(yaw_pitch_roll_from_rotation(self.rotation)[0])
 
     @cached_property
     def box(self) -> Box:
@@ -72,7 +78,7 @@ class State:
     @cached_property
     def statics(self) -> BoxStatics:
         """Loads, errors and deflections over the required box."""
-        return BoxStatics(self.design, self.box, self.rotation)
+        return BoxStatics(self.design, self.box, self.rotation, self.places)
 
     @cached_property
     def limits(self) -> tuple[constraints.Constraint, ...]:

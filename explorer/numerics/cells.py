@@ -1,0 +1,81 @@
+"""The largest values of functions over a box, by bounds over cells.
+
+A cell tells values that it attains and upper bounds of all its values. Cells of which a bound
+exceeds what is asked, or the largest value found, are divided in halves along every axis.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from explorer.numerics.arrays import FloatArray
+
+# Cells that are measured at once, and the most cells of a search.
+BATCH, MOST = 4096, 50_000
+# Share by which the bound of an excess may exceed the largest one attained.
+LOOSE = 1e-3
+
+
+class CellValues(NamedTuple):
+    """Values of m functions in n cells of a box with k axes, or in the one of the whole box.
+
+    Attributes:
+        values: Largest values attained, shape (n, m).
+        places: Where they are attained, shape (n, m, k).
+        bounds: Upper bounds, shape (n, m); infinite where none is known.
+    """
+
+    values: FloatArray
+    places: FloatArray
+    bounds: FloatArray
+
+
+def corners_of_cells(lows: FloatArray, highs: FloatArray) -> FloatArray:
+    """Return the corners of n cells given by their lows and highs (n, k), shape (n, 2^k, k)."""
+    shares = np.array([*itertools.product((0.0, 1.0), repeat=lows.shape[1])])
+    return np.asarray(np.where(shares == 1.0, highs[:, None], lows[:, None]))
+
+
+def largest_values(
+    measure: Callable[[FloatArray, FloatArray], CellValues],
+    lows: FloatArray,
+    highs: FloatArray,
+    enough: float = 0.0,
+) -> CellValues:
+    """Return the largest values of m functions over a box, without the axis of the cells.
+
+    Bounds are loose where too many cells would have to be divided.
+
+    Args:
+        measure: Function that measures cells given by their lows and highs, shape (n, k) each.
+        lows: Low ends of the box, shape (k,).
+        highs: High ends of the box; an axis may have no length.
+        enough: Level up to which no value is resolved: only that none is above it. Above it the
+            search ends where the bound exceeds it by little more than the largest value does.
+    """
+    size = highs - lows
+    halves = np.array([*itertools.product(*((0.0, 0.5) if each else (0.0,) for each in size))])
+    low, left, found = lows[None], MOST, None
+    while found is None or len(low):
+        low, size = (low[:, None] + size * halves).reshape(-1, len(size)), 0.5 * size
+        parts = np.array_split(low, 1 + len(low) // BATCH)
+        measured = [measure(part, np.minimum(part + size, highs)) for part in parts]
+        cells = CellValues(*map(np.concatenate, zip(*measured, strict=True)))
+        rows = cells.values.argmax(axis=0)
+        columns = np.arange(len(rows))
+        best, places = cells.values[rows, columns], cells.places[rows, columns]
+        if found is not None:
+            is_old = found.values >= best
+            best = np.where(is_old, found.values, best)
+            places = np.where(is_old[:, None], found.places, places)
+        least = enough + (1.0 + LOOSE) * np.maximum(best - enough, 0.0)
+        divides, left = np.any(cells.bounds > least, axis=1), left - len(low)
+        divides &= len(halves) * np.count_nonzero(divides) <= left
+        bounds = np.where(divides[:, None], -np.inf, cells.bounds).max(axis=0)
+        bounds = bounds if found is None else np.maximum(found.bounds, bounds)
+        found, low = CellValues(best, places, np.maximum(bounds, best)), low[divides]
+    return found
