@@ -25,8 +25,9 @@ from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import SHIFTS, ObjectiveName, Problem
 
 Status = Literal["converged", "not converged", "infeasible", "stalled", "outdone", "cancelled"]
-"""Converged: the design meets all demands and has a workspace, and no design nearby that meets
-them has a better objective. Not converged: the iterations ended first.
+"""Converged: the design has a workspace and meets all demands, which is proven for every position
+of the required box and every azimuth of a tilt, and no design nearby that meets them has a better
+objective. Not converged: the iterations ended first, or a demand is not proven.
 Infeasible: the search found no design that meets all demands. Stalled: the demands are met,
 but no step improves the objective although the conditions of an optimum fail. Outdone: even
 without the clearance demanded, the best design is no better than that of an earlier start.

@@ -74,9 +74,6 @@ class StartError(InputError):
 
 Box = tuple[Triple, Triple]
 
-AZIMUTHS = 12
-"""Number of azimuths, at equal distances from the yaw of home, in which a tilt is demanded."""
-
 MOST_TILT = 90.0
 # The demands that are positive numbers.
 SIZES = ("volume", "reach", "clearance", "stroke_ratio")
@@ -100,8 +97,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         held: Whether the design's load must be held over the required box, within the limits of
             its actuators, struts and guide.
         tilt: Tilt from the orientation of home that the required box must allow in every azimuth,
-            in degrees. It is demanded in `AZIMUTHS` of them; between these the box may allow
-            some hundredths less.
+            and at every smaller tilt, in degrees.
         error: Worst displacement of the tool by the actuators' errors over the required box, in
             design units.
         deflection: Largest displacement of the tool under the design's load over the required box,
