@@ -83,6 +83,8 @@ window.explorer.projection ??= (() => {
       // From the eye's plane to what lies before it, which is drawn too.
       this.ray.origin.addScaledVector(this.ray.direction, -DEPTH);
     };
+    // A camera that glides ends by a last small step, which viser does not report.
+    page().cameraControl.addEventListener("sleep", () => page().sendCamera());
     page().requestRender();
   };
   hook();
