@@ -2,8 +2,9 @@
 
 At a fixed orientation the ends of legs move no farther than the position does, so the distance
 of two legs is Lipschitz in position with constant 1. In a cell of positions it is therefore
-bounded from below by its value at the centre less half the cell's diagonal. Cells are divided
-into eight until that bound is within the tolerance of the least distance attained.
+bounded from below by its value at the centre less half the cell's diagonal. Where that does not
+suffice, `explorer.workspace.clearance_bounds` has a bound of second order. Cells are divided into
+eight until the bound is within the tolerance of the least distance attained.
 
 Measures at the nodes of a grid, the centres of the cells of a box about the workspace, take less
 time: its extent, margins and clearances. A least value at the nodes is an upper bound.
@@ -23,16 +24,23 @@ from explorer.legs.clearance import (
     PAIRS,
     distance_gradients,
     joined_pairs,
+    leg_axes,
     leg_clearances,
     radii_of_pairs,
 )
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.margins import margins
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.margins import margins, planes_of_singularity
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.checks import whole
 from explorer.numerics.search import descend
-from explorer.workspace.limits.constraints import Cone, Constraint, constraints, orientation_of
+from explorer.workspace.clearance_bounds import (
+    LEGS_OF_PAIRS,
+    SlackBounds,
+    bound_slacks,
+    raise_bounds,
+)
+from explorer.workspace.limits.constraints import Constraint, constraints, orientation_of
 from explorer.workspace.limits.region import box_of, mark_nodes, region_of
 
 # Tolerance of a least clearance, over the reach.
@@ -88,7 +96,8 @@ def least_clearances(
         only_least: Whether to resolve the least of the six alone, which takes far less time;
             the other clearances and bounds still hold, but may differ by more.
         below: Clearance, in design units, from which on none is resolved. A pair that is nowhere
-            closer has the clearance inf; other pairs have positions strictly within limits.
+            closer has the clearance inf, and that is proven without a tolerance; other pairs have
+            positions strictly within limits.
         margin: Least |δ| of the positions that count, in design units.
         most: Largest number of cells that a pair may have left to divide; if more are left, its
             bound is the least one of those cells.
@@ -115,43 +124,66 @@ def least_clearances(
     middles = lows + size * (np.indices((FIRST_CELLS,) * 3).reshape(3, -1).T + 0.5)
     # Pairs whose bounds can still be raised.
     is_open = ~joined
+
+    def sought() -> FloatArray:
+        """Return the distance of each pair below which a cell is divided, shape (6,)."""
+        if only_least:
+            return np.asarray((best - radii).min() + radii - resolution)
+        # It is proven of a pair that is nowhere too close without a tolerance.
+        is_too_close = ~np.isnan(positions[:, 0]) | math.isinf(below)
+        return np.asarray(best - np.where(is_too_close, resolution, 0.0))
+
     while len(middles):
-        half = 0.5 * float(np.linalg.norm(size))
-        slack = domain.least_slacks(middles)
-        middles, slack = middles[slack >= -half], slack[slack >= -half]
-        distance = np.zeros((0, len(PAIRS)))
+        half = 0.5 * size
+        kept = [(np.zeros((0, 3)), np.zeros((0, len(PAIRS))))]
         for part in np.array_split(middles, 1 + len(middles) // BATCH):
             before_each()
-            of_part = leg_clearances(Configuration(design, part, r)).distance
-            distance = np.vstack([distance, of_part])
-        inside = np.flatnonzero(slack >= 0.0)
-        if len(inside):
-            least = inside[distance[inside].argmin(axis=0)]
-            attained = distance[least, np.arange(len(PAIRS))]
-            better = attained < best
-            best[better], positions[better] = attained[better], middles[least[better]]
+            slack = domain.bound_slacks(part, half)
+            is_near = slack.largest(half).min(axis=-1, initial=math.inf) >= 0.0
+            at, slack = Configuration(design, part[is_near], r), slack.of(is_near)
+            distance, inside = leg_clearances(at).distance, domain.contains(at.position)
+            better = np.zeros(len(PAIRS), dtype=np.bool_)
+            if inside.any():
+                least = np.where(inside[:, None], distance, math.inf).argmin(axis=0)
+                attained = distance[least, np.arange(len(PAIRS))]
+                better = attained < best
+                best[better], positions[better] = attained[better], at.position[least[better]]
+            # The lower a least distance so far, the more cells are ruled out by it.
+            falls = better & (best > plane_distance) & math.isinf(below)
             if only_least:
-                # The lower the least clearance so far, the more cells are ruled out by it.
-                pair = int((best - radii).argmin())
-                if better[pair] and best[pair] > plane_distance[pair]:
-                    best[pair], positions[pair] = domain.descend(pair, best[pair], positions[pair])
-                    if best[pair] <= CROSSING * design.reach:
-                        best[pair] = 0.0
-        low = np.maximum(distance - half, plane_distance)
-        largest = (best - radii).min() + radii if only_least else best
-        divides = is_open & (low < largest - resolution)
+                falls &= np.arange(len(PAIRS)) == (best - radii).argmin()
+            for pair in np.flatnonzero(falls).tolist():
+                best[pair], positions[pair] = domain.descend(pair, best[pair], positions[pair])
+            best[best <= CROSSING * design.reach] = 0.0
+            low = np.maximum(distance - float(np.linalg.norm(half)), plane_distance)
+            raise_bounds(
+                len(low),
+                is_open & (low < sought()),
+                LEGS_OF_PAIRS,
+                leg_axes(at),
+                leg_clearances(at).points,
+                half,
+                *slack,
+                low,
+            )
+            divides = is_open & (low < sought())
+            settled = np.minimum(
+                settled, np.where(divides, math.inf, low).min(axis=0, initial=math.inf)
+            )
+            divided = divides.any(axis=-1)
+            kept.append((at.position[divided], low[divided]))
+        middles, low = (np.concatenate(each) for each in zip(*kept, strict=True))
+        divides = is_open & (low < sought())
         is_open = is_open & (divides.sum(axis=0) <= most)
         divides = divides & is_open
-        settled = np.minimum(settled, np.where(divides, math.inf, low).min(axis=0, initial=np.inf))
-        size = 0.5 * size
-        divided = divides.any(axis=-1)
-        middles = (middles[divided][:, None, :] + size * CORNERS).reshape(-1, 3)
+        settled = np.minimum(
+            settled, np.where(divides, math.inf, low).min(axis=0, initial=math.inf)
+        )
+        size = half
+        middles = middles[divides.any(axis=-1)]
+        middles = (middles[:, None, :] + size * CORNERS).reshape(-1, 3)
     is_attained = ~np.isnan(positions[:, 0])
     best[~is_attained] = math.inf
-    if not only_least and math.isinf(below):
-        for pair in np.flatnonzero(is_attained & (best > plane_distance)).tolist():
-            best[pair], positions[pair] = domain.descend(pair, best[pair], positions[pair])
-    best[best <= CROSSING * design.reach] = 0.0
     positions[np.abs(positions) <= CROSSING * design.reach] = 0.0
     bound = np.where(joined, math.inf, np.minimum(settled, best))
     return LeastClearances(best - radii, bound - radii, positions)
@@ -166,16 +198,26 @@ class _Domain:
     limits: tuple[Constraint, ...]
     margin: float
 
-    def least_slacks(self, p: FloatArray) -> FloatArray:
-        """Return signed distances of positions (n, 3) within the domain, or their upper bounds."""
-        least = self._spare_margins(p).min(axis=-1, initial=math.inf)
+    def contains(self, p: FloatArray) -> BoolArray:
+        """Return whether positions (..., 3) are in the domain."""
+        is_within = (self._spare_margins(p) >= 0.0).all(axis=-1)
         for limit in self.limits:
-            distance = limit.signed_distance(p)
-            if isinstance(limit, Cone):
-                # It is right near the cone alone; only its sign is used.
-                distance = np.where(distance >= 0.0, math.inf, -math.ulp(0.0))
-            least = np.minimum(least, distance)
-        return least
+            is_within &= limit.slack(p) >= 0.0
+        return np.asarray(is_within)
+
+    def bound_slacks(self, middles: FloatArray, half: FloatArray) -> SlackBounds:
+        """Return bounds of the slacks in cells with middles (n, 3) and half edges (3,)."""
+        bounds = bound_slacks(self.limits, middles, half)
+        if not self.margin:
+            return bounds
+        planes = planes_of_singularity(self.rotation)
+        sizes = middles @ planes.T
+        # On one side of a plane |δ| is linear.
+        beside = np.where(np.abs(sizes) >= np.abs(planes) @ half, np.abs(sizes), math.inf)
+        return SlackBounds(
+            np.hstack([bounds.values, beside - self.margin]),
+            np.hstack([bounds.slopes, np.sign(sizes)[..., None] * planes]),
+        )
 
     def descend(self, pair: int, least: float, position: FloatArray) -> tuple[float, FloatArray]:
         """Return the least distance near a position in the domain, and where it is attained."""

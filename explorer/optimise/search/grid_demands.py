@@ -50,8 +50,9 @@ WEIGHT = 1e-12
 # Cap on slacks, as a multiple of the size of the start.
 FAR = 1e3
 
-# Tolerance of the proof of a clearance, over the clearance, and the most cells of a pair in it.
-PROVEN, MOST_CELLS = 1e-6, 100_000
+# Tolerance of a clearance that is missed, over the demanded one, and the most cells of a pair in
+# the proof that it is kept.
+BETWEEN, MOST_CELLS = 0.1, 100_000
 
 # The legs of each pair from 0.
 LEGS = np.array(PAIRS) - 1
@@ -119,7 +120,7 @@ class ClearanceDemand(Demand):
         for limit, far in zip(limits, outside, strict=True):
             shares = by_leaving[rows] * np.exp(sharp * far[rows] - out[rows])[:, None]
             gradients -= shares.T @ state.slack(limit, p[rows])[1]
-        return Measured(least / sharp / self.clearance, gradients / self.clearance)
+        return Measured(least / sharp / self.clearance - RESERVE, gradients / self.clearance)
 
     def worst(self, state: State) -> tuple[float, str]:
         """Return the least of the values that `measure` bounds from below, and its pair."""
@@ -134,8 +135,8 @@ class ClearanceDemand(Demand):
         least = least_clearances(
             state.design,
             state.rotation,
-            PROVEN * self.clearance,
-            below=(1.0 + PROVEN) * self.clearance,
+            BETWEEN * self.clearance,
+            below=self.clearance,
             margin=state.problem.demands.clearance_margin,
             most=MOST_CELLS,
         )

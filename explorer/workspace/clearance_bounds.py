@@ -1,0 +1,171 @@
+"""Lower bounds of the distances of legs over cells of positions, of second order in their size.
+
+At a fixed orientation all ends of legs are linear in the position. For any unit vector n the
+distance of two legs is at least the least n·(X − Y) over the ends X and Y of the two, which are
+four linear functions of the position. With n along the closest points at the middle of a cell the
+error falls with the square of the cell.
+
+Where a limit of the workspace holds a distance from falling further, such a function is small only
+beyond the limit. There it is bounded by duality: in the workspace a slack is not negative, so that
+the function is at least itself less λ ≥ 0 times the slack, which is at most a linear function of
+the position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from explorer.legs.clearance import PAIRS
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, dot3, norm3
+from explorer.workspace.limits.constraints import (
+    BallOrCylinder,
+    Cone,
+    Constraint,
+    HalfSpace,
+    Never,
+)
+
+LEGS_OF_PAIRS = np.array(PAIRS, dtype=np.int64) - 1
+
+# Limits that may hold one function at a time: as many meet in a vertex of a workspace.
+HELD_BY = 3
+
+
+class SlackBounds(NamedTuple):
+    """Upper bounds of the slacks of m limits in n cells: values + slopes · q, q from the middle.
+
+    Attributes:
+        values: In the middles, shape (n, m); infinite where no bound is known.
+        slopes: Derivatives by the position, shape (n, m, 3).
+    """
+
+    values: FloatArray
+    slopes: FloatArray
+
+    def largest(self, half: FloatArray) -> FloatArray:
+        """Return bounds over whole cells with half edges (3,), shape (n, m)."""
+        return np.asarray(self.values + np.abs(self.slopes) @ half)
+
+    def of(self, cells: BoolArray) -> SlackBounds:
+        """Return the bounds in some of the cells."""
+        return SlackBounds(self.values[cells], self.slopes[cells])
+
+
+def bound_slacks(
+    limits: Sequence[Constraint], middles: FloatArray, half: FloatArray
+) -> SlackBounds:
+    """Return bounds of the slacks of limits in cells with middles (n, 3) and half edges (3,)."""
+    radius = float(np.linalg.norm(half))
+    values = np.full((len(middles), len(limits)), np.inf)
+    slopes = np.zeros((*values.shape, 3))
+    for index, limit in enumerate(limits):
+        match limit:
+            case HalfSpace():
+                values[:, index], slopes[:, index] = limit.slack(middles), -limit.normal
+            case BallOrCylinder():
+                off = middles - limit.centre
+                off[:, 0] *= limit.is_ball
+                distance = np.linalg.norm(off, axis=-1)
+                outwards = off / np.maximum(distance, np.finfo(float).tiny)[:, None]
+                values[:, index] = limit.slack(middles)
+                slopes[:, index] = -outwards if limit.inside else outwards
+                if not limit.inside:
+                    # The distance from a point or a line is convex.
+                    with np.errstate(divide="ignore"):
+                        values[:, index] += 0.5 * radius**2 / np.maximum(distance - radius, 0.0)
+            case Never():
+                values[:, index] = -np.inf
+            case Cone():
+                pass
+    return SlackBounds(values, slopes)
+
+
+@helper
+def least_over_cell(value: float, slope: Vector, half: FloatArray) -> float:
+    """Return the least value of a linear function over a cell, given its value in the middle."""
+    return value - (abs(slope[0]) * half[0] + abs(slope[1]) * half[1] + abs(slope[2]) * half[2])
+
+
+@helper
+def least_in_workspace(
+    value: float, slope: Vector, half: FloatArray, slack: FloatArray, slack_slope: FloatArray
+) -> float:
+    """Return a lower bound of a linear function in a cell where no slack is negative.
+
+    One limit after another is taken into account, with the λ that raises the bound most: there a
+    component of the slope vanishes.
+    """
+    best = least_over_cell(value, slope, half)
+    for _ in range(HELD_BY):
+        held_value, held_slope, has_grown = value, slope, False
+        for limit in range(len(slack)):
+            x, y, z = slack_slope[limit, 0], slack_slope[limit, 1], slack_slope[limit, 2]
+            for axis in range(3):
+                along = slack_slope[limit, axis]
+                if along * slope[axis] <= 0.0:
+                    continue
+                factor = slope[axis] / along
+                less = value - factor * slack[limit]
+                left = (slope[0] - factor * x, slope[1] - factor * y, slope[2] - factor * z)
+                least = least_over_cell(less, left, half)
+                if least > best:
+                    best, held_value, held_slope, has_grown = least, less, left, True
+        if not has_grown:
+            break
+        value, slope = held_value, held_slope
+    return best
+
+
+@kernel(
+    "void(b1[:,::1], i8[:,::1], f8[:,:,:,::1], f8[:,:,:,::1], f8[::1], f8[:,::1], f8[:,:,::1],"
+    " f8[:,::1])"
+)
+def raise_bounds(
+    needed: BoolArray,
+    legs: IntArray,
+    axes: FloatArray,
+    points: FloatArray,
+    half: FloatArray,
+    slack: FloatArray,
+    slack_slopes: FloatArray,
+    bounds: FloatArray,
+) -> None:
+    """Raise lower bounds of distances (n, 6) where needed (n, 6).
+
+    The axes (n, 4, 2, 3) and closest points (n, 6, 2, 3) are those in the middles.
+    """
+    for row, pair in np.ndindex(needed.shape):
+        if not needed[row, pair]:
+            continue
+        first, second = legs[pair, 0], legs[pair, 1]
+        x = points[row, pair, 0, 0] - points[row, pair, 1, 0]
+        y = points[row, pair, 0, 1] - points[row, pair, 1, 1]
+        z = points[row, pair, 0, 2] - points[row, pair, 1, 2]
+        distance = norm3((x, y, z))
+        if distance <= 0.0:
+            continue
+        n = (x / distance, y / distance, z / distance)
+        least = np.inf
+        for i in range(2):
+            for j in range(2):
+                # A platform end moves as b4 does, a carriage along x only.
+                across = float(i - j)
+                along = (1.0 if i == 1 or 0 < first < 3 else 0.0) - (
+                    1.0 if j == 1 or 0 < second < 3 else 0.0
+                )
+                apart = (
+                    axes[row, first, i, 0] - axes[row, second, j, 0],
+                    axes[row, first, i, 1] - axes[row, second, j, 1],
+                    axes[row, first, i, 2] - axes[row, second, j, 2],
+                )
+                slope = (along * n[0], across * n[1], across * n[2])
+                least = min(
+                    least,
+                    least_in_workspace(dot3(n, apart), slope, half, slack[row], slack_slopes[row]),
+                )
+        bounds[row, pair] = max(bounds[row, pair], least)
