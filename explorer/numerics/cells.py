@@ -15,7 +15,7 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray
 
 # Cells that are measured at once, and the most cells of a search.
-BATCH, MOST = 4096, 50_000
+BATCH, MOST = 4096, 200_000
 # Share by which the bound of an excess may exceed the largest one attained.
 LOOSE = 1e-3
 

@@ -8,6 +8,9 @@ from typing import NamedTuple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.cells import CellValues
 
+PROVEN = 1e-6
+"""Amount up to which a bound may exceed zero in a proof; nothing that is computed may."""
+
 
 class Proof(NamedTuple):
     """What is known of one demand over a whole set of poses.
@@ -32,8 +35,8 @@ class Proof(NamedTuple):
 
     @property
     def is_proven(self) -> bool:
-        """Whether every pose of the set keeps the demand."""
-        return self.bound <= 0.0
+        """Whether every pose of the set keeps the demand, to a millionth."""
+        return self.missed <= 0.0 and self.bound <= PROVEN
 
 
 def proofs_of(

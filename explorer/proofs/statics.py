@@ -22,7 +22,7 @@ from explorer.mechanism.margins import planes_of_singularity
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.numerics.cells import CellValues, corners_of_cells, largest_values
-from explorer.proofs.proof import Proof, proofs_of
+from explorer.proofs.proof import PROVEN, Proof, proofs_of
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, largest_deflection, stiffness_of
 from explorer.statics.reactions import PART_NAMES, least_limits, shares_in_motion
@@ -180,7 +180,7 @@ def _prove(
         return CellValues(values, where, np.where(np.isfinite(bounds), bounds, np.inf))
 
     if box_margins(box, rotation).all():
-        found = largest_values(measure, *np.array(box))
+        found = largest_values(measure, *np.array(box), enough=PROVEN)
     else:
         infinite, corners = np.full(len(names), np.inf), np.tile(box[0], (len(names), 1))
         found = CellValues(infinite, corners, infinite)

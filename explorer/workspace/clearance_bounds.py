@@ -2,8 +2,8 @@
 
 At a fixed orientation all ends of legs are linear in the position. For any unit vector n the
 distance of two legs is at least the least n·(X − Y) over the ends X and Y of the two, which are
-four linear functions of the position. With n along the closest points at the middle of a cell the
-error falls with the square of the cell.
+four functions linear in the position. With n along the closest points at the middle of a cell, and
+turning with the legs to first order, the error falls with the square of the cell.
 
 Where a limit of the workspace holds a distance from falling further, such a function is small only
 beyond the limit. There it is bounded by duality: in the workspace a slack is not negative, so that
@@ -13,15 +13,16 @@ the position.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from explorer.legs.clearance import PAIRS
+from explorer.legs.clearance import PAIRS, closest_shares, normal_rate
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.vectors import Vector, dot3, norm3
+from explorer.numerics.vectors import Vector, along, dot3, minus, norm3, vector
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
@@ -106,10 +107,9 @@ def least_in_workspace(
         for limit in range(len(slack)):
             x, y, z = slack_slope[limit, 0], slack_slope[limit, 1], slack_slope[limit, 2]
             for axis in range(3):
-                along = slack_slope[limit, axis]
-                if along * slope[axis] <= 0.0:
+                if slack_slope[limit, axis] * slope[axis] <= 0.0:
                     continue
-                factor = slope[axis] / along
+                factor = slope[axis] / slack_slope[limit, axis]
                 less = value - factor * slack[limit]
                 left = (slope[0] - factor * x, slope[1] - factor * y, slope[2] - factor * z)
                 least = least_over_cell(less, left, half)
@@ -121,51 +121,73 @@ def least_in_workspace(
     return best
 
 
-@kernel(
-    "void(b1[:,::1], i8[:,::1], f8[:,:,:,::1], f8[:,:,:,::1], f8[::1], f8[:,::1], f8[:,:,::1],"
-    " f8[:,::1])"
-)
+@helper
+def rate_along(leg: int, end: int, axis: int) -> float:
+    """Return the rate at which an end of a leg, 0 at the base, moves with b4 along an axis."""
+    # A carriage moves along x only.
+    return 1.0 if end == 1 or (axis == 0 and 0 < leg < 3) else 0.0
+
+
+@helper
+def unit_along(axis: int, size: float) -> Vector:
+    """Return a vector along an axis."""
+    return (
+        size if axis == 0 else 0.0,
+        size if axis == 1 else 0.0,
+        size if axis == 2 else 0.0,
+    )
+
+
+@kernel("void(b1[:,::1], i8[:,::1], f8[:,:,:,::1], f8[::1], f8[:,::1], f8[:,:,::1], f8[:,::1])")
 def raise_bounds(
     needed: BoolArray,
     legs: IntArray,
     axes: FloatArray,
-    points: FloatArray,
     half: FloatArray,
     slack: FloatArray,
     slack_slopes: FloatArray,
     bounds: FloatArray,
 ) -> None:
-    """Raise lower bounds of distances (n, 6) where needed (n, 6).
-
-    The axes (n, 4, 2, 3) and closest points (n, 6, 2, 3) are those in the middles.
-    """
+    """Raise lower bounds of distances (n, 6), where needed, given the axes in the middles."""
+    ends, turns = np.empty((4, 3)), np.empty((3, 3))
     for row, pair in np.ndindex(needed.shape):
         if not needed[row, pair]:
             continue
         first, second = legs[pair, 0], legs[pair, 1]
-        x = points[row, pair, 0, 0] - points[row, pair, 1, 0]
-        y = points[row, pair, 0, 1] - points[row, pair, 1, 1]
-        z = points[row, pair, 0, 2] - points[row, pair, 1, 2]
-        distance = norm3((x, y, z))
+        for side in range(2):
+            for axis in range(3):
+                ends[side, axis] = axes[row, first, side, axis]
+                ends[2 + side, axis] = axes[row, second, side, axis]
+        a, b = vector(ends, 0), vector(ends, 2)
+        u, v, r = minus(vector(ends, 1), a), minus(vector(ends, 3), b), minus(a, b)
+        s, t = closest_shares(u, v, r)
+        apart = minus(along(r, s, u), along((0.0, 0.0, 0.0), t, v))
+        distance = norm3(apart)
         if distance <= 0.0:
             continue
-        n = (x / distance, y / distance, z / distance)
+        n = (apart[0] / distance, apart[1] / distance, apart[2] / distance)
+        # n turns with the legs, at these rates by the position.
+        turned = 0.0
+        for axis in range(3):
+            du = unit_along(axis, 1.0 - rate_along(first, 0, axis))
+            dv = unit_along(axis, 1.0 - rate_along(second, 0, axis))
+            turn = normal_rate(n, u, du, v, dv, s, t)
+            turns[axis, 0], turns[axis, 1], turns[axis, 2] = turn
+            turned += norm3(turn) * half[axis]
         least = np.inf
         for i in range(2):
             for j in range(2):
-                # A platform end moves as b4 does, a carriage along x only.
-                across = float(i - j)
-                along = (1.0 if i == 1 or 0 < first < 3 else 0.0) - (
-                    1.0 if j == 1 or 0 < second < 3 else 0.0
-                )
-                apart = (
-                    axes[row, first, i, 0] - axes[row, second, j, 0],
-                    axes[row, first, i, 1] - axes[row, second, j, 1],
-                    axes[row, first, i, 2] - axes[row, second, j, 2],
-                )
-                slope = (along * n[0], across * n[1], across * n[2])
-                least = min(
-                    least,
-                    least_in_workspace(dot3(n, apart), slope, half, slack[row], slack_slopes[row]),
-                )
+                w = minus(vector(ends, i), vector(ends, 2 + j))
+                value, slope = dot3(n, w), (0.0, 0.0, 0.0)
+                for axis in range(3):
+                    rate = rate_along(first, i, axis) - rate_along(second, j, axis)
+                    change = n[axis] * rate + dot3(vector(turns, axis), w)
+                    slope = along(slope, 1.0, unit_along(axis, change))
+                    for other in range(3):
+                        value -= abs(turns[other, axis] * rate) * half[axis] * half[other]
+                own = least_in_workspace(value, slope, half, slack[row], slack_slopes[row])
+                least = min(least, own)
+        # The direction is at right angles to its turns.
+        if least > 0.0:
+            least /= math.sqrt(1.0 + turned * turned)
         bounds[row, pair] = max(bounds[row, pair], least)

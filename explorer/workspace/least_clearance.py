@@ -45,8 +45,7 @@ from explorer.workspace.limits.region import box_of, mark_nodes, region_of
 
 # Tolerance of a least clearance, over the reach.
 DEFAULT_TOLERANCE = 1e-4
-# Number of cells on each axis at first, and default of the largest number of cells that a pair may
-# have left to divide.
+# Number of cells on each axis at first, and the most that a pair may have left to divide.
 FIRST_CELLS = 8
 MOST_CELLS = 10_000
 # Largest number of cells whose clearances are computed at once.
@@ -83,7 +82,6 @@ def least_clearances(
     only_least: bool = False,
     below: float = math.inf,
     margin: float = 0.0,
-    most: int = MOST_CELLS,
     before_each: Callable[[], None] = lambda: None,
 ) -> LeastClearances:
     """Return the least clearances in the constant-orientation workspace.
@@ -99,8 +97,6 @@ def least_clearances(
             closer has the clearance inf, and that is proven without a tolerance; other pairs have
             positions strictly within limits.
         margin: Least |δ| of the positions that count, in design units.
-        most: Largest number of cells that a pair may have left to divide; if more are left, its
-            bound is the least one of those cells.
         before_each: Function that is called before each batch of cells; it may raise.
 
     Raises:
@@ -161,7 +157,6 @@ def least_clearances(
                 is_open & (low < sought()),
                 LEGS_OF_PAIRS,
                 leg_axes(at),
-                leg_clearances(at).points,
                 half,
                 *slack,
                 low,
@@ -174,7 +169,7 @@ def least_clearances(
             kept.append((at.position[divided], low[divided]))
         middles, low = (np.concatenate(each) for each in zip(*kept, strict=True))
         divides = is_open & (low < sought())
-        is_open = is_open & (divides.sum(axis=0) <= most)
+        is_open = is_open & (divides.sum(axis=0) <= MOST_CELLS)
         divides = divides & is_open
         settled = np.minimum(
             settled, np.where(divides, math.inf, low).min(axis=0, initial=math.inf)
@@ -211,13 +206,12 @@ class _Domain:
         if not self.margin:
             return bounds
         planes = planes_of_singularity(self.rotation)
-        sizes = middles @ planes.T
-        # On one side of a plane |δ| is linear.
-        beside = np.where(np.abs(sizes) >= np.abs(planes) @ half, np.abs(sizes), math.inf)
-        return SlackBounds(
-            np.hstack([bounds.values, beside - self.margin]),
-            np.hstack([bounds.slopes, np.sign(sizes)[..., None] * planes]),
-        )
+        sizes, change = middles @ planes.T, np.abs(planes) @ half
+        # On one side of its plane |δ| is linear.
+        is_beside = np.abs(sizes) >= change
+        values = np.abs(sizes) + np.where(is_beside, 0.0, change) - self.margin
+        slopes = np.where(is_beside, np.sign(sizes), 0.0)[..., None] * planes
+        return SlackBounds(np.hstack([bounds.values, values]), np.hstack([bounds.slopes, slopes]))
 
     def descend(self, pair: int, least: float, position: FloatArray) -> tuple[float, FloatArray]:
         """Return the least distance near a position in the domain, and where it is attained."""

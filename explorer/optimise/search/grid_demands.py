@@ -50,9 +50,8 @@ WEIGHT = 1e-12
 # Cap on slacks, as a multiple of the size of the start.
 FAR = 1e3
 
-# Tolerance of a clearance that is missed, over the demanded one, and the most cells of a pair in
-# the proof that it is kept.
-BETWEEN, MOST_CELLS = 0.1, 100_000
+# Tolerance of a clearance that is missed, over the demanded one.
+BETWEEN = 0.1
 
 # The legs of each pair from 0.
 LEGS = np.array(PAIRS) - 1
@@ -138,7 +137,6 @@ class ClearanceDemand(Demand):
             BETWEEN * self.clearance,
             below=self.clearance,
             margin=state.problem.demands.clearance_margin,
-            most=MOST_CELLS,
         )
         missed, bounds = (1.0 - each / self.clearance for each in least[:2])
         found = CellValues(missed, least.position, bounds)

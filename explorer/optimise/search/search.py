@@ -321,9 +321,8 @@ def _missed_words(proof: Proof) -> str:
     place = f"({', '.join(map(format_number, proof.position.tolist()))})"
     if proof.missed > 0.0:
         return f"not converged: {proof.name} is not kept everywhere, such as at {place}"
-    return (
-        f"not converged: {proof.name} is kept wherever it was computed, but not proven at {place}"
-    )
+    words = f"not converged: {proof.name} is kept wherever it was computed, but not proven"
+    return f"{words} at {place}" if np.isfinite(proof.position).all() else f"{words} everywhere"
 
 
 def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
