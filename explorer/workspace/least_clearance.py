@@ -13,7 +13,6 @@ time: its extent, margins and clearances. A least value at the nodes is an upper
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -82,7 +81,6 @@ def least_clearances(
     only_least: bool = False,
     below: float = math.inf,
     margin: float = 0.0,
-    before_each: Callable[[], None] = lambda: None,
 ) -> LeastClearances:
     """Return the least clearances in the constant-orientation workspace.
 
@@ -97,7 +95,6 @@ def least_clearances(
             closer has the clearance inf, and that is proven without a tolerance; other pairs have
             positions strictly within limits.
         margin: Least |δ| of the positions that count, in design units.
-        before_each: Function that is called before each batch of cells; it may raise.
 
     Raises:
         InputError: Not a rotation.
@@ -133,7 +130,6 @@ def least_clearances(
         half = 0.5 * size
         kept = [(np.zeros((0, 3)), np.zeros((0, len(PAIRS))))]
         for part in np.array_split(middles, 1 + len(middles) // BATCH):
-            before_each()
             slack = domain.bound_slacks(part, half)
             is_near = slack.largest(half).min(axis=-1, initial=math.inf) >= 0.0
             at, slack = Configuration(design, part[is_near], r), slack.of(is_near)
