@@ -161,12 +161,15 @@ def test_page_asks_for_that_of_viser_beside_itself(
 def test_page_that_does_not_come_is_told_on_the_start_screen(
     browser: Browser, running: Running
 ) -> None:
-    with closing(browser.new_context()) as context:
+    with closing(browser.new_context(forced_colors="active")) as context:
         page = context.new_page()
         page.route("**/viser.html*", lambda route: route.abort())
         page.goto(running.url)
         told = page.get_by_role("status")
         expect(told).to_have_text(re.compile(r"The page does not start: .+\. Load it again\."))
+        # The bar is seen where the system has colours of its own.
+        bar = page.get_by_role("progressbar")
+        expect(bar).to_have_css("background-color", "rgba(128, 136, 148, 0.25)")
 
 
 def test_page_without_webgl_lacks_the_scene_alone_and_says_what_to_switch_on(
