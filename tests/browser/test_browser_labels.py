@@ -322,6 +322,9 @@ def test_scale_bar_has_the_length_that_it_names_at_any_distance(wide: Tab, facto
     closer = wide.page.evaluate(SCALE)
     assert float(closer["text"].removesuffix(" mm").replace(",", "")) < millimetres
     assert 30.0 <= closer["length"] <= 100.0
+    # It is whole, or not there.
+    wide.resize((683, 384))
+    assert wide.page.evaluate(SCALE) is None
 
 
 @pytest.mark.draws

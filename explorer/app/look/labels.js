@@ -34,8 +34,9 @@ window.explorer.labels ??= (() => {
   const PALE = 0.35;
   // Milliseconds between two looks at what hides the points.
   const LOOK = 150;
-  // The axes: centre from the left and from below, and length, in pixels.
-  const AXES = { left: 42, up: 42, length: 27 };
+  // The axes: centre from the left and from below, and length, in pixels; the scale is beside them in
+  // a scene of at least some width.
+  const AXES = { left: 42, up: 42, length: 27, room: 200 };
   // The colours of the drag handle.
   const COLOURS = ["#ff2060", "#20b060", "#2080ff"];
   const THEMES = {
@@ -221,10 +222,10 @@ window.explorer.labels ??= (() => {
     `${millimetres.toLocaleString("en", { maximumSignificantDigits: 6 })} mm`;
   // What tells the size of things: a bar where it is the same at every depth, and else the size of
   // the squares on the ground.
-  const scaleOf = ({ camera, height }) => {
+  const scaleOf = ({ camera, width, height }) => {
     const label = nodes("LabelMessage").find(({ name }) => name === SCALE);
     const grid = nodes("GridMessage")[0];
-    if (!label || !grid) return null;
+    if (!label || !grid || width < AXES.room) return null;
     let millimetres = Number(label.props.text);
     if (!window.explorer.projection.isParallel(camera)) {
       return { length: 0, text: `1 square = ${lengthText(millimetres)}` };
