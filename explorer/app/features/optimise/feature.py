@@ -23,7 +23,7 @@ from explorer.app.features.optimise.work import complete_request, requested_box
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.inputs.controls import At, Bound, Controls
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import add_lines
+from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import preset_of
@@ -38,7 +38,7 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
 from explorer.optimise.problem import OVER_BOX, YAW, Box, ObjectiveName, Problem
-from explorer.singularity.colours import JOINT, css
+from explorer.singularity.colours import css
 from explorer.statics.compliance import is_elastic
 
 OBJECTIVES: dict[str, ObjectiveName] = {
@@ -335,7 +335,7 @@ class RequiredBox(ScenePart):
     """The edges of the required box, if there is one."""
 
     def __init__(self, services: Services) -> None:
-        self._edges = add_lines(services.scene, "/required_box", len(EDGES), JOINT, 2.0)
+        self._edges = add_lines(services.scene, "/required_box", len(EDGES), GHOST, 2.0)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the box of a frame."""
