@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from likeness import decoded, likeness
 from playwright.sync_api import Browser, Locator, expect
-from tab import Tab
+from tab import Tab, middle
 
 from explorer.app.browser.headless import CHROMIUM_FLAGS, find_chromium
 from explorer.app.server import Running
@@ -84,13 +84,16 @@ def lost(tab: Tab) -> Locator:
 
 def test_silent_explorer_is_told_and_its_numbers_are_marked_until_it_answers(tab: Tab) -> None:
     numbers = tab.page.locator("div[style*=opacity]:has(> * .ex-bar, > .ex-bar)").last
-    tab.settle()
+    tab.resize((1280, 720))
     with suspended(tab.running):
         wait_in_vain(tab, 7.5)
         expect(lost(tab)).to_have_count(0)
         wait_in_vain(tab, 7.5)
         expect(lost(tab)).to_be_visible()
         expect(numbers).to_have_css("opacity", "0.5")
+        views = tab.page.locator(".ex-views").bounding_box()
+        assert views
+        assert middle(lost(tab))[1] > views["y"] + 2.0 * views["height"]
     expect(lost(tab)).to_have_count(0)
     expect(numbers).to_have_css("opacity", "1")
     # What the page asked meanwhile ends no step.
