@@ -378,6 +378,7 @@ def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened
     notice = search_notice(found)
     assert notice is not None
     assert (notice.title, notice.text) == ("Converged", "volume 8,000 cm³")
+    assert "Volume 8,000 cm³ after" in result_words(found)
     assert notice.buttons == (ACCEPT, REVERT)
     assert (buttons_of(found)[ACCEPT], buttons_of(found)[REVERT]) == ("filled", "enabled")
     after = Accept().apply(found)

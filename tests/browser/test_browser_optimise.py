@@ -26,7 +26,7 @@ def test_optimise_finds_a_design_shows_it_gives_its_files_and_takes_it(tab: Tab)
     found = tab.state.design
     assert workspace_volume(found).volume >= 7053.04 * (1.0 - 1e-6)
     assert found.reach < 17.9
-    expect(tab.page.get_by_text(f"longest leg = {found.reach:.6g}")).to_be_visible()
+    expect(tab.page.get_by_text(f"longest leg {found.reach:.6g} units after")).to_be_visible()
     expect(tab.page.locator(".uplot canvas:visible")).to_have_count(3)
     for value in (OPTIMAL.reach, found.reach, found.reach - OPTIMAL.reach):
         text = f"{value:.4f}".replace("-", "−")

@@ -74,7 +74,7 @@ class VolumeDemand(Demand):
     def __init__(self, volume: float, *, is_equality: bool) -> None:
         self.volume = volume
         self.is_equality = is_equality
-        self.names = (f"{CATALOGUE['volume'].label} {volume:.6g}",)
+        self.names = (CATALOGUE["volume"].label,)
 
     def measure(self, state: State) -> Measured:
         """Return (V / V′)^⅓ − 1."""
@@ -87,7 +87,7 @@ class ReachDemand(Demand):
 
     def __init__(self, reach: float) -> None:
         self.reach = reach
-        self.names = (f"{CATALOGUE['longest_leg'].label} {reach:.6g}",)
+        self.names = (CATALOGUE["longest_leg"].label,)
 
     def measure(self, state: State) -> Measured:
         """Return 1 − reach / largest."""

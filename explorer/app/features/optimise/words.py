@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -184,7 +185,11 @@ def verdict_words(state: State, run: SearchRun, verdict: SearchResult) -> str:
             "No result", f"{markup.sentence(verdict.message)} Your design is as it was."
         )
     title = "Cancelled" if verdict.best is None else TITLES[verdict.status]
-    message = markup.sentence(verdict.message.removeprefix(f"{verdict.status}: "))
+    message = verdict.message.removeprefix(f"{verdict.status}: ")
+    if verdict.best is not None:
+        # The search tells its objective in design units.
+        value = rf"{OBJECTIVE_SYMBOLS[run.problem.objective]} = \S+"
+        message = re.sub(value, _reached_text(run.problem, verdict.best, state), message)
     remarks: list[str] = []
     if verdict.starts > 1:
         remarks.append(f"{verdict.starts} starts, {verdict.converged} converged")
@@ -196,7 +201,7 @@ def verdict_words(state: State, run: SearchRun, verdict: SearchResult) -> str:
         remarks.append("changed by hand since")
     return (
         f"{markup.status(title, 'within' if verdict.status == 'converged' else 'beyond')}"
-        f'<div class="ex-before">{escape(message)} '
+        f'<div class="ex-before">{escape(markup.sentence(message))} '
         f'<span class="ex-dim">{" · ".join(remarks)}</span></div>'
     )
 
