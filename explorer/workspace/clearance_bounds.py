@@ -24,6 +24,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, along, dot3, minus, norm3, vector
 from explorer.workspace.limits.constraints import (
+    ACROSS,
     BallOrCylinder,
     Cone,
     Constraint,
@@ -39,6 +40,8 @@ HELD_BY = 3
 
 class SlackBounds(NamedTuple):
     """Upper bounds of the slacks of m limits in n cells: values + slopes · q, q from the middle.
+
+    For a cone, whose slack is an angle, they bound the distance from a plane that touches it.
 
     Attributes:
         values: In the middles, shape (n, m); infinite where no bound is known.
@@ -82,7 +85,14 @@ def bound_slacks(
             case Never():
                 values[:, index] = -np.inf
             case Cone():
-                pass
+                # A convex cone lies on one side of each plane that touches it.
+                if limit.half_angle < 0.5 * math.pi:
+                    leg, angle = limit.leg(middles), limit.half_angle
+                    off = leg - (leg @ limit.axis)[:, None] * limit.axis
+                    length = np.maximum(np.linalg.norm(off, axis=-1), np.finfo(float).tiny)
+                    inwards = math.sin(angle) * limit.axis - math.cos(angle) * off / length[:, None]
+                    values[:, index] = (inwards * leg).sum(axis=-1)
+                    slopes[:, index] = inwards * (ACROSS if limit.flat else 1.0)
     return SlackBounds(values, slopes)
 
 

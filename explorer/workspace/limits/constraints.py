@@ -128,13 +128,14 @@ class Cone(_Distances):
 
     def slack(self, p: FloatArray) -> FloatArray:
         """Return the slack of positions (..., 3) in radians; negative outside the cone."""
-        return self.half_angle - angle_between(self._leg(p), self.axis)
+        return self.half_angle - angle_between(self.leg(p), self.axis)
 
     def signed_distance(self, p: FloatArray) -> FloatArray:
         """Return the distances of positions (..., 3) from the nearby surface, to first order."""
-        return self.slack(p) * np.linalg.norm(self._leg(p), axis=-1)
+        return self.slack(p) * np.linalg.norm(self.leg(p), axis=-1)
 
-    def _leg(self, p: FloatArray) -> FloatArray:
+    def leg(self, p: FloatArray) -> FloatArray:
+        """Return the leg, or what counts of it, at positions (..., 3)."""
         return (p - self.apex) * (ACROSS if self.flat else 1.0)
 
 
