@@ -190,7 +190,7 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
     if not 2 <= len(rows) <= MOST_LINES + 1:
         raise InputError(
             f"{file} needs a line of headings, such as x_mm, and 1 to {MOST_LINES} lines of "
-            f"numbers below it; it has {len(rows)} lines that are not blank"
+            f"numbers below it; lines that are not blank: {len(rows)}"
         )
     headings, columns = [cell.strip() for cell in rows[0][1]], dict[str, Column]()
     for place, heading in enumerate(headings):

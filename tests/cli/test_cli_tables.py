@@ -227,7 +227,7 @@ x,y,z,yaw/1,2,3,4 | has no column pitch among x, y, z, yaw; it needs yaw, pitch,
 x [deg],y,z/1,2,3 | column x [deg]: its unit must be one of mm, cm, m, in, such as x_
 x,y,z,yaw_mm,pitch,roll/1,2,3,4,5,6 | its unit must be one of deg, °, degrees, rad, radians
 x,y,z,qw,qx,qy,qz/1,2,3,0,0,0,0 | line 2, column qw: '0': a quaternion must not be all zeros
-x,y,z | 1 to 100000 lines of numbers
+x,y,z | 1 to 100000 lines of numbers below it; lines that are not blank: 1
 x,y,z/"1,2,3 | line 2, column x
 """
 """Tables, a slash between their lines, each with words of the message."""
