@@ -1,7 +1,8 @@
 """The largest values of functions over a box, by bounds over cells.
 
-A cell tells values that it attains and upper bounds of all its values. Cells of which a bound
-exceeds what is asked, or the largest value found, are divided in halves along every axis.
+Of each cell, values that are attained in it and upper bounds of all its values are computed. Cells
+of which a bound exceeds what is asked, or the largest value found, are divided in halves along
+every axis.
 """
 
 from __future__ import annotations
@@ -54,8 +55,9 @@ def largest_values(
         measure: Function that measures cells given by their lows and highs, shape (n, k) each.
         lows: Low ends of the box, shape (k,).
         highs: High ends of the box; an axis may have no length.
-        enough: Level up to which no value is resolved: only that none is above it. Above it the
-            search ends where the bound exceeds it by little more than the largest value does.
+        enough: Level up to which no value is resolved: the search only proves that none is above
+            it. Above, it ends where the bound exceeds the level by little more than the largest
+            value does.
     """
     size = highs - lows
     halves = np.array([*itertools.product(*((0.0, 0.5) if each else (0.0,) for each in size))])
@@ -74,7 +76,7 @@ def largest_values(
             places = np.where(is_old[:, None], found.places, places)
         least = enough + (1.0 + LOOSE) * np.maximum(best - enough, 0.0)
         divides, left = np.any(cells.bounds > least, axis=1), left - len(low)
-        divides &= len(halves) * np.count_nonzero(divides) <= left
+        divides &= size.any() and len(halves) * np.count_nonzero(divides) <= left
         bounds = np.where(divides[:, None], -np.inf, cells.bounds).max(axis=0)
         bounds = bounds if found is None else np.maximum(found.bounds, bounds)
         found, low = CellValues(best, places, np.maximum(bounds, best)), low[divides]

@@ -1,1 +1,1 @@
-"""Demands on a design over a whole box of positions: proven, or missed in a pose that is told."""
+"""Demands on a design over a whole box of positions: proven, or refuted by a pose."""

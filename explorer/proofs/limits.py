@@ -1,14 +1,15 @@
 """The limits of a design over a box of positions of b4 and over all tilts from an orientation.
 
 A tilt turns the platform about an axis parallel to the base plane. At one orientation closed forms
-tell the worst position of the box: a longest length is convex in the position, so that a corner has
-it; a shortest one is the distance of the box from a point; all other quantities are linear.
+tell the worst position of the box: a longest length is convex in the position, so that its maximum
+is at a corner; a shortest one is the distance of the box from a point; all other quantities are
+linear.
 
-Over a cell of azimuths and tilts a vector R v of the platform is within e |v| of a mean of its
-values at the four corners, with e of the order of the square of the cell. A slack that is concave
-in such vectors is therefore at least the least one of the corners, less e times its rate. That of a
-shortest length is not concave: there the distance from a plane that touches the box is, which is a
-lower bound.
+Over a cell of azimuths and tilts a vector R v of the platform is within e |v| of a convex
+combination of its values at the four corners, with e of the order of the square of the cell. A
+slack that is concave in such vectors is therefore at least the least one of the corners, less e
+times its rate. That of a shortest length is not concave: for it the half-space behind a plane that
+touches the box stands for the box, since the distance from that is linear and no greater.
 """
 
 from __future__ import annotations
@@ -59,13 +60,13 @@ class End(NamedTuple):
 
 
 class BoxLimits:
-    """The limits of a design over a box of positions of b4, lows and highs, at any orientations.
+    """The limits of a design over a box of positions of b4, lows and highs, at tilts of a rotation.
 
     Raises:
         InputError: The design bounds the swing of a joint.
     """
 
-    def __init__(self, design: Design, box: tuple[Triple, Triple]) -> None:
+    def __init__(self, design: Design, box: tuple[Triple, Triple], rotation: FloatArray) -> None:
         if bounds_angles(design):
             raise InputError("limits over a box are not decided for a design that bounds swings")
         self.design = design
@@ -76,7 +77,7 @@ class BoxLimits:
             for bound, name, side in demand.finite_ends():
                 if demand.quantity == quantities.GAP:
                     # No tilt that keeps the gap changes the order of the carriages.
-                    self.ends.append(_end_of_gap(design, name, bound))
+                    self.ends.append(_end_of_gap(design, rotation, name, bound))
                 elif side > 0.0 or bound.value > 0.0 or demand.quantity < quantities.L1:
                     self.ends.append(End(name, demand.quantity, bound, side))
 
@@ -127,9 +128,9 @@ class BoxLimits:
         return np.where(np.greater(direction, 0.0), self.highs, self.lows)
 
 
-def _end_of_gap(design: Design, name: str, bound: Bound) -> End:
-    """Return the end of d3 − d1 that keeps a gap on its side of zero in the home pose."""
-    if (design.b3 - design.b2) * design.home_pose.rotation[0, 0] >= 0.0:
+def _end_of_gap(design: Design, rotation: FloatArray, name: str, bound: Bound) -> End:
+    """Return the end of d3 − d1 that keeps a gap on its side of zero at a rotation."""
+    if (design.b3 - design.b2) * rotation[0, 0] >= 0.0:
         return End(name, quantities.ORDER, bound, -1.0)
     return End(name, quantities.ORDER, Bound(-bound.value), 1.0)
 
@@ -163,9 +164,11 @@ def prove_limits(
         tilt: Largest tilt in every azimuth, in degrees, below 90.
 
     Raises:
-        InputError: The design bounds the swing of a joint.
+        InputError: The design bounds the swing of a joint, or the tilt is out of range.
     """
-    over = BoxLimits(design, box)
+    if not 0.0 <= tilt < 90.0:
+        raise InputError(f"the tilt must be at least 0° and below 90°; got {tilt:.6g}°")
+    over = BoxLimits(design, box, rotation)
 
     def measure(lows: FloatArray, highs: FloatArray) -> CellValues:
         places = corners_of_cells(lows, highs)

@@ -8,9 +8,6 @@ from typing import NamedTuple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.cells import CellValues
 
-PROVEN = 1e-6
-"""Amount up to which a bound may exceed zero in a proof; nothing that is computed may."""
-
 
 class Proof(NamedTuple):
     """What is known of one demand over a whole set of poses.
@@ -20,7 +17,7 @@ class Proof(NamedTuple):
     Attributes:
         name: Name of the demand, such as "l1 maximum" or "load of actuator l1".
         missed: Amount of the worst pose that was found.
-        bound: Upper bound of the amounts of all poses.
+        bound: Upper bound of the amounts of all poses, less the tolerance of the proof.
         place: Place of the worst pose: azimuth and tilt in degrees, or the position of b4.
         position: b4 of the worst pose, shape (3,), in design units.
         rotation: Rotation of that pose, platform to base, shape (3, 3).
@@ -35,8 +32,8 @@ class Proof(NamedTuple):
 
     @property
     def is_proven(self) -> bool:
-        """Whether every pose of the set keeps the demand, to a millionth."""
-        return self.missed <= 0.0 and self.bound <= PROVEN
+        """Whether every pose of the set keeps the demand, to the tolerance of the proof."""
+        return max(self.missed, self.bound) <= 0.0
 
 
 def proofs_of(

@@ -22,11 +22,14 @@ from explorer.mechanism.margins import planes_of_singularity
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.numerics.cells import CellValues, corners_of_cells, largest_values
-from explorer.proofs.proof import PROVEN, Proof, proofs_of
+from explorer.proofs.proof import Proof, proofs_of
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, largest_deflection, stiffness_of
 from explorer.statics.reactions import PART_NAMES, least_limits, shares_in_motion
 from explorer.statics.weights import payload_wrench
+
+# Tolerance of a proof, over the largest value allowed: what is computed keeps to the value itself.
+TOLERANCE = 1e-6
 
 
 class Bounds(NamedTuple):
@@ -83,14 +86,13 @@ def prove_load(
     """Prove that a design holds its load over a box, or find where it does not.
 
     The load is the payload's weight and its force of any direction; the legs count as weightless.
-    Amounts are shares of the limits of actuators, struts and guide over the largest one allowed,
-    less 1.
+    Amounts are utilisations of actuators, struts and guide over the largest one allowed, less 1.
 
     Args:
         design: The manipulator.
         box: Lows and highs of the positions of b4, in design units.
         rotation: Platform to base, shape (3, 3).
-        most: Largest share of a limit that is allowed.
+        most: Largest utilisation that is allowed.
         acceleration: Acceleration from rest, in m/s², that the platform must have in every
             direction besides, without turning.
     """
@@ -98,7 +100,7 @@ def prove_load(
     parts = np.flatnonzero(np.isfinite(limits))
     what = "acceleration by" if acceleration else "load of"
 
-    def shares(at: Configuration) -> FloatArray:
+    def ratios(at: Configuration) -> FloatArray:
         return shares_in_motion(at, acceleration)[..., parts] / most
 
     def second(forces: CellForces) -> FloatArray:
@@ -109,7 +111,7 @@ def prove_load(
         return (np.concatenate(every, axis=-1) / limits)[..., parts] / most
 
     names = [f"{what} {PART_NAMES[part]}" for part in parts]
-    return _prove(design, box, rotation, names, shares, second)
+    return _prove(design, box, rotation, names, ratios, second)
 
 
 def prove_error(
@@ -122,13 +124,13 @@ def prove_error(
     """
     errors = actuator_errors(design)
 
-    def shares(at: Configuration) -> FloatArray:
+    def ratios(at: Configuration) -> FloatArray:
         return worst_errors(at, errors).displacement[..., None] / most
 
     def second(forces: CellForces) -> FloatArray:
         return (forces.at_tool.second @ errors)[..., None] / most
 
-    return _prove(design, box, rotation, ["error"], shares, second)
+    return _prove(design, box, rotation, ["error"], ratios, second)
 
 
 def prove_deflection(
@@ -138,7 +140,7 @@ def prove_deflection(
     stiffness, struts = stiffness_of(design)
     weight, force = payload_wrench(design, rotation), design.payload.force_n
 
-    def shares(at: Configuration) -> FloatArray:
+    def ratios(at: Configuration) -> FloatArray:
         soft = compliance_of(at, stiffness, struts)
         return largest_deflection(soft, weight, force)[0][..., None] / most
 
@@ -151,7 +153,7 @@ def prove_deflection(
         moved = soft.times(forces.at_tool).times(forces.of_load(design))
         return moved.second.sum(axis=-1, keepdims=True) / most
 
-    return _prove(design, box, rotation, ["deflection"], shares, second)
+    return _prove(design, box, rotation, ["deflection"], ratios, second)
 
 
 def _prove(
@@ -159,17 +161,17 @@ def _prove(
     box: tuple[Triple, Triple],
     rotation: FloatArray,
     names: Sequence[str],
-    shares: Callable[[Configuration], FloatArray],
+    ratios: Callable[[Configuration], FloatArray],
     second: Callable[[CellForces], FloatArray],
 ) -> list[Proof]:
-    """Return the proofs of m demands on shares, which follow from a configuration, (..., m).
+    """Return the proofs that m ratios, which follow from a configuration (..., m), are at most 1.
 
     Bounds of their second derivatives along each axis follow from the forces, shape (n, 3, m).
     """
 
     def measure(lows: FloatArray, highs: FloatArray) -> CellValues:
         places = corners_of_cells(lows, highs)
-        found = shares(Configuration(design, places, rotation, design.tool.position)) - 1.0
+        found = ratios(Configuration(design, places, rotation, design.tool.position)) - 1.0
         worst = found.argmax(axis=1)[:, None]
         values = np.take_along_axis(found, worst, axis=1)[:, 0]
         half = 0.5 * (highs - lows)
@@ -180,7 +182,8 @@ def _prove(
         return CellValues(values, where, np.where(np.isfinite(bounds), bounds, np.inf))
 
     if box_margins(box, rotation).all():
-        found = largest_values(measure, *np.array(box), enough=PROVEN)
+        found = largest_values(measure, *np.array(box), enough=TOLERANCE)
+        found = found._replace(bounds=np.maximum(found.values, found.bounds - TOLERANCE))
     else:
         infinite, corners = np.full(len(names), np.inf), np.tile(box[0], (len(names), 1))
         found = CellValues(infinite, corners, infinite)

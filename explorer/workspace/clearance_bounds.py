@@ -5,7 +5,7 @@ distance of two legs is at least the least n·(X − Y) over the ends X and Y of
 four functions linear in the position. With n along the closest points at the middle of a cell, and
 turning with the legs to first order, the error falls with the square of the cell.
 
-Where a limit of the workspace holds a distance from falling further, such a function is small only
+Where a limit of the workspace keeps the legs from coming nearer, such a function is small only
 beyond the limit. There it is bounded by duality: in the workspace a slack is not negative, so that
 the function is at least itself less λ ≥ 0 times the slack, which is at most a linear function of
 the position.
@@ -34,8 +34,8 @@ from explorer.workspace.limits.constraints import (
 
 LEGS_OF_PAIRS = np.array(PAIRS, dtype=np.int64) - 1
 
-# Limits that may hold one function at a time: as many meet in a vertex of a workspace.
-HELD_BY = 3
+# Most limits that bound one function together: as many meet in a vertex of a workspace.
+MOST_LIMITS = 3
 
 
 class SlackBounds(NamedTuple):
@@ -64,7 +64,6 @@ def bound_slacks(
     limits: Sequence[Constraint], middles: FloatArray, half: FloatArray
 ) -> SlackBounds:
     """Return bounds of the slacks of limits in cells with middles (n, 3) and half edges (3,)."""
-    radius = float(np.linalg.norm(half))
     values = np.full((len(middles), len(limits)), np.inf)
     slopes = np.zeros((*values.shape, 3))
     for index, limit in enumerate(limits):
@@ -79,6 +78,7 @@ def bound_slacks(
                 values[:, index] = limit.slack(middles)
                 slopes[:, index] = -outwards if limit.inside else outwards
                 if not limit.inside:
+                    radius = float(np.linalg.norm(half[0 if limit.is_ball else 1 :]))
                     # The distance from a point or a line is convex.
                     with np.errstate(divide="ignore"):
                         values[:, index] += 0.5 * radius**2 / np.maximum(distance - radius, 0.0)
@@ -112,8 +112,8 @@ def least_in_workspace(
     component of the slope vanishes.
     """
     best = least_over_cell(value, slope, half)
-    for _ in range(HELD_BY):
-        held_value, held_slope, has_grown = value, slope, False
+    for _ in range(MOST_LIMITS):
+        next_value, next_slope, has_grown = value, slope, False
         for limit in range(len(slack)):
             x, y, z = slack_slope[limit, 0], slack_slope[limit, 1], slack_slope[limit, 2]
             for axis in range(3):
@@ -124,10 +124,10 @@ def least_in_workspace(
                 left = (slope[0] - factor * x, slope[1] - factor * y, slope[2] - factor * z)
                 least = least_over_cell(less, left, half)
                 if least > best:
-                    best, held_value, held_slope, has_grown = least, less, left, True
+                    best, next_value, next_slope, has_grown = least, less, left, True
         if not has_grown:
             break
-        value, slope = held_value, held_slope
+        value, slope = next_value, next_slope
     return best
 
 

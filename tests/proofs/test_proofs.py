@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case
 from long_cases import long_after
-from machines import FULL, PRECISE, same_for_all
+from machines import FULL, OPTIMAL, PRECISE, same_for_all
 from random_searches import positions_of_box
 
 from explorer import Actuators, Design, InputError
@@ -78,6 +78,15 @@ def test_largest_values_lie_between_what_is_attained_and_the_bound(
     assert (found.bounds - enough)[is_above] == pytest.approx(excess[is_above], rel=1e-3)
 
 
+def test_bound_of_a_point_is_what_was_computed() -> None:
+    def measure(lows: FloatArray, highs: FloatArray) -> CellValues:
+        values = lows + highs
+        return CellValues(values, lows[:, None], values + np.inf)
+
+    found = largest_values(measure, np.ones(1), np.ones(1))
+    assert (found.values, found.bounds) == (2.0, np.inf)
+
+
 # Limits over a box and tilts
 
 
@@ -117,10 +126,21 @@ def test_limits_are_proven_exactly_where_random_poses_keep_them(seed: int) -> No
         assert (proof.position <= np.array(box[1]) + 1e-12).all()
 
 
-def test_limits_with_swings_are_not_decided_over_a_box() -> None:
+def test_gap_is_kept_on_the_side_of_the_orientation_that_is_tilted() -> None:
+    design = limited(OPTIMAL, gap=0.3, carriage_order="any", margin=None)
+    rotation = np.diag([-1.0, -1.0, 1.0]) @ design.home_pose.rotation
+    position = np.array([10.0, 5.0, 9.0])
+    assert poses_are_valid(design, position, rotation)
+    proofs = prove_limits(design, box_about(position, np.zeros(3)), rotation)
+    assert all(proof.is_proven for proof in proofs)
+
+
+def test_what_is_not_decided_over_a_box_is_refused() -> None:
     design, box, rotation, tilt = limits_case(0)
     with pytest.raises(InputError, match="bounds swings"):
         prove_limits(limited(design, swing=Swing(a1=30.0)), box, rotation, tilt)
+    with pytest.raises(InputError, match="below 90°; got 90°"):
+        prove_limits(design, box, rotation, 90.0)
 
 
 # Loads, accelerations, errors and deflections

@@ -177,7 +177,7 @@ class BoxDemand(Demand):
 
     def __init__(self, start: State, tilt: float | None) -> None:
         self.tilt = tilt
-        over = BoxLimits(start.design, start.box)
+        over = BoxLimits(start.design, start.box, start.rotation)
         self.looks: dict[str, list[Look]] = {}
         for end in over.ends:
             # At home's orientation `GapDemand` demands what is the same in every position.
@@ -199,7 +199,7 @@ class BoxDemand(Demand):
 
     def measure(self, state: State) -> Measured:
         """Return the slacks that are looked at, over the size; with a tilt, less a reserve."""
-        over, size = BoxLimits(state.design, state.box), state.problem.size
+        over, size = BoxLimits(state.design, state.box, state.rotation), state.problem.size
         ends = {end.name: end for end in over.ends}
         measured = [
             _slacks_of(over, ends[name], looks, state)
@@ -214,7 +214,8 @@ class BoxDemand(Demand):
         """Return the limits that are missed, or not proven, at a tilt, and look there for each."""
         if self.tilt is None:
             return []
-        ends = {end.name: end for end in BoxLimits(state.design, state.box).ends}
+        over = BoxLimits(state.design, state.box, state.rotation)
+        ends = {end.name: end for end in over.ends}
         proofs = prove_limits(state.design, state.box, state.rotation, self.tilt)
         found = [proof for proof in proofs if not proof.is_proven]
         for proof in found:
