@@ -13,9 +13,10 @@ from likeness import decoded, likeness
 from playwright.sync_api import Browser, Locator, expect
 from tab import Tab, middle
 
+from explorer import PRESETS
 from explorer.app.browser.headless import CHROMIUM_FLAGS, find_chromium
 from explorer.app.server import Running
-from explorer.app.state.actions import SetPosition
+from explorer.app.state.actions import Open, SetPosition
 
 # Lets time pass by a pause after which the page looks whether it was answered.
 PAUSE = 2.5
@@ -215,3 +216,6 @@ def test_scene_is_whole_again_once_the_browser_has_its_graphics_back(tab: Tab) -
         tab.page.evaluate(GIVE_BACK)
         expect(told).to_have_count(0)
         assert likeness(before, decoded(tab.picture())).spot < 2.0
+    # What was made before is not deleted from the new graphics, of which the console would tell.
+    session.do(Open(PRESETS["paper-initial"]))
+    tab.picture()

@@ -40,14 +40,17 @@ window.explorer.graphics ??= (() => {
     return standIn(this);
   };
 
-  // Copies of one mesh have a buffer and programs of their own, of which three.js does not know that
-  // they are lost.
-  const forEachCopied = (run) =>
-    window.__viserMutable.scene.traverse((each) => each.isInstancedMesh2 && run(each));
+  const forEachDrawn = (run) =>
+    window.__viserMutable.scene.traverse((each) => each.geometry && run(each));
   const lose = ({ isTrusted, target }) => {
     if (!isTrusted || target !== window.__viserMutable?.canvas) return;
     tell(LOST);
-    forEachCopied((each) => {
+    forEachDrawn((each) => {
+      // What lies in the lost context could not be deleted later, from the new one.
+      each.geometry.dispose();
+      // Copies of one mesh have a buffer and programs of their own, of which three.js does not know
+      // that they are lost.
+      if (!each.isInstancedMesh2) return;
       each.dispose();
       each.material = each.material.clone();
     });
@@ -55,7 +58,7 @@ window.explorer.graphics ??= (() => {
   const find = ({ target }) => {
     if (target !== window.__viserMutable?.canvas) return;
     message.remove();
-    forEachCopied((each) => each.initIndexAttribute());
+    forEachDrawn((each) => each.isInstancedMesh2 && each.initIndexAttribute());
   };
   addEventListener("webglcontextlost", lose, true);
   addEventListener("webglcontextrestored", find, true);
