@@ -109,7 +109,7 @@ class Sending:
                 self._visible.get(part, part not in self._waiting) for part in lineage
             ):
                 self._sent.add(each)
-                yield from _joined(self._waiting.pop(each))
+                yield from _merge_updates(self._waiting.pop(each))
 
 
 def _subject_of(message: Any) -> tuple[str, str]:
@@ -119,7 +119,7 @@ def _subject_of(message: Any) -> tuple[str, str]:
     return message.entity_state_key() or ("", "")
 
 
-def _joined(messages: list[Any]) -> Iterator[Message]:
+def _merge_updates(messages: list[Any]) -> Iterator[Message]:
     """Yield messages on a part, the first of which makes it, with its last properties."""
     first, *others = messages
     made = copy(first)
