@@ -1,1 +1,1 @@
-"""The page: state and session know no browser; scene, panels and server draw them in viser."""
+"""The page of the mechanism; state and session know no browser, and all else draws in viser."""

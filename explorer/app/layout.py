@@ -8,7 +8,11 @@ from typing import get_args
 
 import viser
 
-from explorer.app.browser.viser_gaps import (
+from explorer.app.features.feature import Feature, Place, Services, Side, Tab
+from explorer.app.scene.camera import Cameras
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.buttons import MANUAL, Buttons, press_button
+from explorer.page.browser.viser_gaps import (
     dock_above_in,
     keep_arrangement,
     make_with_id,
@@ -16,13 +20,9 @@ from explorer.app.browser.viser_gaps import (
     run_script,
     run_script_in,
 )
-from explorer.app.features.feature import Feature, Place, Services, Side, Tab
-from explorer.app.look import read_script
-from explorer.app.scene.camera import Cameras
-from explorer.app.session.clock import Timer
-from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import MANUAL, Buttons, press_button
+from explorer.page.look import read_script
+from explorer.page.session.clock import Timer
+from explorer.page.widgets.assigning import Update
 
 # Seconds until the panels of a new page are laid out.
 SETTLE_SECONDS = 0.7

@@ -10,9 +10,6 @@ from collections import deque
 import numpy as np
 import viser
 
-from explorer.app.browser.browser_facts import listen
-from explorer.app.browser.downloads import Downloads
-from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.compare.feature import COMPARE
 from explorer.app.features.designs.feature import DESIGNS
 from explorer.app.features.feature import Feature, Panel, Services
@@ -33,22 +30,25 @@ from explorer.app.features.studies.folders import StudyFolders, study_folders
 from explorer.app.features.view.feature import VIEW
 from explorer.app.features.workspace.feature import WORKSPACE
 from explorer.app.layout import TITLE, Bar, Layout, Panels
-from explorer.app.look import read_script, read_stylesheet
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
-from explorer.app.session import clock
 from explorer.app.session.session import Session, Who
-from explorer.app.session.worker import Worker, log_error
 from explorer.app.state.frame import Frame
-from explorer.app.state.presses import Presses
 from explorer.app.state.state import State
 from explorer.app.storage.user_data import Autosaver, UserData
-from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import sentence
-from explorer.app.widgets.palette import Command, Palette
 from explorer.app.widgets.theme import Theme
 from explorer.numerics.arrays import FloatArray
+from explorer.page.browser.browser_facts import listen
+from explorer.page.browser.viser_gaps import run_script
+from explorer.page.look import read_script, read_stylesheet
+from explorer.page.session import clock
+from explorer.page.session.worker import Worker, log_error
+from explorer.page.state.presses import Presses
+from explorer.page.widgets.assigning import QUIET_SECONDS, Assigner, Update
+from explorer.page.widgets.palette import Command, Palette
 
 # The features, in the order of their tabs and of their parts of the bar.
 FEATURES: tuple[Feature, ...] = (

@@ -12,11 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from explorer.app.browser.headless import PictureError, headless_browser
-from explorer.app.look import call_script, read_script
 from explorer.files.writing import write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
+from explorer.page.browser.headless import PictureError, headless_browser
+from explorer.page.look import call_script, read_script
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -168,7 +168,7 @@ def settle(page: Page, client: ClientHandle) -> None:
     Raises:
         PictureError: It does not draw in time.
     """
-    from explorer.app.browser.viser_gaps import mark_broadcasts, run_script_in
+    from explorer.page.browser.viser_gaps import mark_broadcasts, run_script_in
 
     deadline = time.monotonic() + PATIENCE_SECONDS
     mark = next(_marks)

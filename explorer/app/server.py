@@ -16,14 +16,11 @@ from pathlib import Path
 
 import viser
 
-from explorer.app.browser.viser_server import protect, start_viser, stop_viser
 from explorer.app.features.studies.folders import STUDIES_FOLDER, StudyFolders
 from explorer.app.page import TITLE, Page
-from explorer.app.security import EVERYWHERE, Access, Guard, is_loopback
 from explorer.app.session.history import check_drawable
 from explorer.app.state.state import open_state
 from explorer.app.state.view import View
-from explorer.app.storage.folder import data_folder
 from explorer.app.storage.user_data import UserData, open_user_data
 from explorer.errors import ExplorerError, ServerError, StorageError
 from explorer.files.writing import make_folder
@@ -32,6 +29,9 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.compiled import warm_in_background
 from explorer.numerics.interruption import Interruption
+from explorer.page.browser.viser_server import protect, start_viser, stop_viser
+from explorer.page.security import EVERYWHERE, Access, Guard, is_loopback
+from explorer.page.storage.folder import data_folder
 
 # Preset that is opened if there is no session to continue.
 FIRST_DESIGN = "paper-optimal"

@@ -9,16 +9,16 @@ import viser
 from desk import Desk
 from services import StubWorker, services_for
 
-from explorer.app.browser.viser_server import start_viser, stop_viser
 from explorer.app.features.feature import Services
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.server import Running, start
-from explorer.app.session.worker import Worker
 from explorer.app.state.state import open_state
 from explorer.app.state.view import View
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.buttons import Buttons
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.browser.viser_server import start_viser, stop_viser
+from explorer.page.session.worker import Worker
 
 
 @pytest.fixture(scope="module")

@@ -18,10 +18,10 @@ from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.page.widgets.assigning import Update
 
 
 class Browser:

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import viser
 
-from explorer.app.browser.downloads import Downloads, File
 from explorer.app.features.feature import Services
 from explorer.app.session.session import Session, Who
-from explorer.app.session.worker import Worker
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.downloads import Downloads, File
+from explorer.page.session.worker import Worker
 
 
 def _ignore(message: str, who: Who) -> None:

@@ -6,8 +6,8 @@ import itertools
 import os
 import time
 
-from explorer.app.session.worker import Channel
 from explorer.errors import InputError
+from explorer.page.session.worker import Channel
 
 # Seconds between two values.
 PAUSE = 0.002

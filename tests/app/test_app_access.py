@@ -13,10 +13,10 @@ from hypothesis import given, strategies as st
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
-from explorer.app.security import Access, Refusal, is_loopback
 from explorer.app.server import Running, start
 from explorer.errors import ServerError
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.security import Access, Refusal, is_loopback
 
 PORT = 8080
 TOKEN = "a-token_of-16-or-more"

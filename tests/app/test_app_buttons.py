@@ -20,9 +20,6 @@ from page_props import shown_by
 from sample_states import iterates_of
 from socket_tab import SocketTab
 
-from explorer.app import look
-from explorer.app.browser import viser_gaps
-from explorer.app.browser.viser_gaps import PLACE
 from explorer.app.features.optimise import runner
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest, SearchResult
@@ -33,12 +30,15 @@ from explorer.app.server import Running
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import Open, Set, SetJoint, SetPosition
 from explorer.app.state.compared import SLOTS
-from explorer.app.widgets import assigning
-from explorer.app.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 from explorer.app.widgets.buttons import Buttons, extra_button, press_button
 from explorer.files.extras import EXTRAS, LINUX_ALONE, install_command
 from explorer.files.packaged import SOURCES
 from explorer.mechanism.design_file import PRESETS
+from explorer.page import look
+from explorer.page.browser import viser_gaps
+from explorer.page.browser.viser_gaps import PLACE
+from explorer.page.widgets import assigning
+from explorer.page.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 
 pytestmark = pytest.mark.usefixtures("idle_workers")
 
@@ -142,7 +142,8 @@ def test_button_in_markup_is_escaped() -> None:
 
 
 def test_every_class_of_the_markup_has_a_rule() -> None:
-    sources = "".join(path.read_text("utf-8") for path in (SOURCES / "explorer/app").rglob("*.py"))
+    rooms = (SOURCES / "explorer" / room for room in ("page", "app"))
+    sources = "".join(path.read_text("utf-8") for room in rooms for path in room.rglob("*.py"))
     used = set(re.findall(r"\bex-[a-z]+\b", sources))
     sheet = look.read_file("page.css")
     ruled = set(re.findall(r"\.(ex-[a-z]+)", sheet))

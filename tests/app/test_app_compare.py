@@ -48,7 +48,6 @@ from explorer.app.state.state import State, open_state
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
-from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
@@ -58,6 +57,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Guide, Payload
 from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import Unit
+from explorer.page.widgets.assigning import Assigner
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 

@@ -18,7 +18,6 @@ from strategies import designs
 
 from explorer.app.features.mechanism.sketch import FIGURE_WIDTH, HEIGHT, WIDTH, sketch
 from explorer.app.features.singularity.feature import measures_table
-from explorer.app.look import read_stylesheet
 from explorer.app.scene.camera import (
     FIELD_OF_VIEW,
     FIRST_ASPECT,
@@ -43,6 +42,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_fitted
+from explorer.page.look import read_stylesheet
 from explorer.singularity.colours import FAR_WARNINGS, OUTLINE, Rgb, proximity_colour
 
 OPTIMAL = PRESETS["paper-optimal"]

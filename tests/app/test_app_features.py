@@ -58,12 +58,12 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.view import OrientationView
 from explorer.app.storage.user_data import open_user_data
-from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.palette import PALETTE_KEY, Command, Key, Palette, Widget, widgets
 from explorer.errors import ExplorerError
 from explorer.files.packaged import read_page
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
+from explorer.page.widgets.assigning import Update
+from explorer.page.widgets.palette import PALETTE_KEY, Command, Key, Palette, Widget, widgets
 
 pytestmark = pytest.mark.usefixtures("idle_workers")
 

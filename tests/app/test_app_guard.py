@@ -26,13 +26,13 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import CloseCode
 from websockets.sync.client import ClientConnection
 
-from explorer.app.browser.viser_server import LARGEST_UPLOAD, start_viser, stop_viser
 from explorer.app.features.optimise import buttons
-from explorer.app.security import LARGEST_MESSAGE, Access, Guard
 from explorer.app.server import Running, start
 from explorer.app.storage.session_file import encode_session
 from explorer.errors import ServerError
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.browser.viser_server import LARGEST_UPLOAD, start_viser, stop_viser
+from explorer.page.security import LARGEST_MESSAGE, Access, Guard
 
 DESIGN = PRESETS["paper-optimal"]
 TOKEN = "a-token_of-16-or-more"
@@ -340,7 +340,7 @@ def test_viser_that_serves_in_another_way_is_not_used(monkeypatch: pytest.Monkey
     asyncio_server = SimpleNamespace(serve=websockets.asyncio.server.serve)
     elsewhere = SimpleNamespace(asyncio=SimpleNamespace(server=asyncio_server))
     monkeypatch.setattr("viser.infra._infra.websockets", elsewhere)
-    monkeypatch.setattr("explorer.app.browser.viser_server.stop_viser", stop)
+    monkeypatch.setattr("explorer.page.browser.viser_server.stop_viser", stop)
     with pytest.raises(
         ServerError, match=r"^viser [^\n]* does not guard; [^\n]*pip install[^\n]*$"
     ):

@@ -47,13 +47,13 @@ from explorer.app.state.actions import (
     SetVariable,
 )
 from explorer.app.state.frame import Frame
-from explorer.app.state.presses import Press, Presses
 from explorer.app.state.state import Hold, State, open_state
 from explorer.errors import ExplorerError, InputError
 from explorer.legs.moves import move_clearance
 from explorer.mechanism.design import JOINTS, VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.page.state.presses import Press, Presses
 
 # Each example is a whole session.
 few = settings(max_examples=settings().max_examples // 3)

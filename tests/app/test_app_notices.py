@@ -14,7 +14,6 @@ import pytest
 from client import Client, client_of, press_update, presses_in, wait_for
 from services import StubWorker
 
-from explorer.app.browser.downloads import Downloads
 from explorer.app.features.designs.feature import UNSAVED
 from explorer.app.server import Running, start
 from explorer.app.session.session import move_to
@@ -22,6 +21,7 @@ from explorer.app.state.actions import SetPosition
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
+from explorer.app.widgets.downloads import Downloads
 from explorer.mechanism.design_file import PRESETS
 
 

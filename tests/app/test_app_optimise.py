@@ -71,7 +71,6 @@ from explorer.app.features.optimise.work import (
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.server import start as start_page
 from explorer.app.session.session import UNDO
-from explorer.app.session.worker import Channel
 from explorer.app.state.actions import (
     Action,
     Open,
@@ -97,6 +96,7 @@ from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate, compare_designs, curves_of
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
 from explorer.optimise.search.sqp import Trail
+from explorer.page.session.worker import Channel
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.table import GAP
 from explorer.workspace.slices.volume import workspace_volume

@@ -59,8 +59,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at
 from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
 from explorer.app.state.state import State, angles_of, joints_of, open_state
-from explorer.app.widgets.assigning import Assigner
-from explorer.app.widgets.palette import widgets
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.folds import to_folds
@@ -70,6 +68,8 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS
+from explorer.page.widgets.assigning import Assigner
+from explorer.page.widgets.palette import widgets
 from explorer.paths.loads import path_loads
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid

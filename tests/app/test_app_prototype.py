@@ -44,12 +44,12 @@ from explorer.app.state.actions import Open, Set, SetPose, SetPosition, SetVaria
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrototypeView
-from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.markup import status
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Payload
 from explorer.mechanism.pose import Pose
+from explorer.page.widgets.assigning import Assigner
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places
 from explorer.prototype.fitting import broken_joint_limits, buildability

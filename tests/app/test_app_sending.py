@@ -13,10 +13,10 @@ import server_clock
 from viser._messages import ReplayDoneMessage, RunJavascriptMessage, SceneNodeUpdateMessage
 from viser.infra._messages import Message
 
-from explorer.app.browser.sending import Sending
 from explorer.app.server import Running
 from explorer.app.state.actions import Open, Set
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.browser.sending import Sending
 
 Fields = dict[str, Any]
 

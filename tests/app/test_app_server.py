@@ -19,11 +19,11 @@ import viser
 from client import client_of, wait_for
 
 from explorer.app import server as server_module
-from explorer.app.browser.viser_server import start_viser
-from explorer.app.security import Serve
 from explorer.app.server import Running, start
 from explorer.errors import ServerError
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.browser.viser_server import start_viser
+from explorer.page.security import Serve
 
 DESIGN = PRESETS["paper-optimal"]
 

@@ -23,7 +23,6 @@ from explorer.app.session.session import REDO, UNDO, Session
 from explorer.app.state.actions import SetName, SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.storage import user_data
-from explorer.app.storage.folder import data_folder
 from explorer.app.storage.session_file import (
     MOST_ORPHANS,
     MOST_STEPS,
@@ -35,6 +34,7 @@ from explorer.app.storage.session_file import (
 )
 from explorer.app.storage.user_data import Autosaver, open_user_data
 from explorer.errors import StorageError
+from explorer.page.storage.folder import data_folder
 
 DATA = Path(__file__).parents[1] / "data"
 RICH, OPENED = rich_state(), open_state(OPTIMAL)

@@ -18,7 +18,6 @@ from client import wait_for
 from desk import Desk
 from hypothesis import given, strategies as st
 
-from explorer.app.browser.browser_facts import decode_text
 from explorer.app.features.feature import Services
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.feature import DECODER, PlotEvent, StudiesPanel
@@ -69,6 +68,7 @@ from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.numerics.number_text import UNITS, Unit
+from explorer.page.browser.browser_facts import decode_text
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.parts import part_paths, write_part
 from explorer.sweep.results import Results, load_results

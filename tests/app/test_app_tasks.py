@@ -17,7 +17,7 @@ import pytest
 from client import wait_for
 
 from explorer.app.server import ALLOCATOR, LOG, start_log
-from explorer.app.session.worker import CANCELLED, DIED_TWICE, RESTARTED, Worker, log_error
+from explorer.page.session.worker import CANCELLED, DIED_TWICE, RESTARTED, Worker, log_error
 from tests.app import telling
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -270,7 +270,7 @@ def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
 def test_worker_process_ends_when_its_parent_is_gone() -> None:
     code = """
 import os, sys
-from explorer.app.session.worker import Worker
+from explorer.page.session.worker import Worker
 from tests.app import telling
 worker = Worker(print)
 def receive(value):

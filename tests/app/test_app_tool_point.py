@@ -61,8 +61,6 @@ from explorer.app.state.compared import Look
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
-from explorer.app.widgets.assigning import Assigner
-from explorer.app.widgets.palette import widgets
 from explorer.mechanism.configuration import Point
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
@@ -71,6 +69,8 @@ from explorer.mechanism.machine import Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
+from explorer.page.widgets.assigning import Assigner
+from explorer.page.widgets.palette import widgets
 from explorer.workspace.limits.constraints import constraints
 
 OPTIMAL = PRESETS["paper-optimal"]

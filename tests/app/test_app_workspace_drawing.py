@@ -22,7 +22,6 @@ from explorer.app.features.workspace.words import drawing_words
 from explorer.app.scene.surfaces import MOST_COLOURED, Colouring, Shell, creased_faces
 from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
-from explorer.app.session.worker import CancelledError, Channel, Worker
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
@@ -32,6 +31,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
+from explorer.page.session.worker import CancelledError, Channel, Worker
 from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.slices.volume import workspace_nodes

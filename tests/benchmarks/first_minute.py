@@ -16,7 +16,7 @@ from pathlib import Path
 
 from benchmarks.table import Row, seconds
 from benchmarks.timing import EXPLORER, ROOT, elapsed, run_to_end
-from explorer.app.browser.headless import find_chromium, headless_browser
+from explorer.page.browser.headless import find_chromium, headless_browser
 
 RUNS = 5
 SEARCH = (

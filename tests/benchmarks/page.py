@@ -20,8 +20,6 @@ from server_clock import wait_until_drawn
 
 from benchmarks.table import Row, seconds
 from explorer import PRESETS
-from explorer.app.browser.headless import find_chromium, headless_browser
-from explorer.app.browser.viser_gaps import mark_broadcasts
 from explorer.app.screenshot import (
     AWAIT_FRAMES,
     PATIENCE_SECONDS,
@@ -32,6 +30,8 @@ from explorer.app.screenshot import (
 )
 from explorer.app.server import Running, start
 from explorer.numerics.compiled import warm
+from explorer.page.browser.headless import find_chromium, headless_browser
+from explorer.page.browser.viser_gaps import mark_broadcasts
 
 RUNS = 5
 SIZE = (1280, 800)

@@ -33,8 +33,8 @@ from explorer.app.server import Running
 from explorer.app.state.actions import Open, Set
 from explorer.app.state.state import State
 from explorer.app.state.view import PrecisionView
-from explorer.app.widgets.assigning import Assigner, Update
 from explorer.mechanism.design_file import typical_machine
+from explorer.page.widgets.assigning import Assigner, Update
 
 ROUNDS, EVENTS, WARM_UP_EVENTS = 3, 100, 20
 EVENTS_PER_SECOND = 30.0

@@ -12,10 +12,10 @@ import pytest
 from client import PROTOCOL, wait_for
 from playwright.sync_api import Browser
 
-from explorer.app.browser.viser_server import start_viser, stop_viser
 from explorer.app.screenshot import HOLD
 from explorer.app.server import Running, start
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.browser.viser_server import start_viser, stop_viser
 
 DESIGN = PRESETS["paper-optimal"]
 TOKEN = "a-token_of-16-or-more"

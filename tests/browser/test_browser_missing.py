@@ -14,9 +14,9 @@ from playwright.sync_api import Browser, Locator, expect
 from tab import Tab, middle
 
 from explorer import PRESETS
-from explorer.app.browser.headless import CHROMIUM_FLAGS, find_chromium
 from explorer.app.server import Running
 from explorer.app.state.actions import Open, SetPosition
+from explorer.page.browser.headless import CHROMIUM_FLAGS, find_chromium
 
 # Lets time pass by a pause after which the page looks whether it was answered.
 PAUSE = 2.5

@@ -27,8 +27,8 @@ from explorer.app.screenshot import (
 from explorer.app.server import Running, start
 from explorer.app.state.actions import Set, SetPosition
 from explorer.app.state.view import View
-from explorer.app.widgets.assigning import Update
 from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.page.widgets.assigning import Update
 
 # One browser draws the same picture to the last bit each time. Another version or machine may
 # smooth edges differently, but never shift them by more than half a pixel: that shift measures

@@ -36,19 +36,20 @@ ROOMS = (
     "sweep",
     "reproduce",
     "export",
+    "page",
     "app",
     "cli",
     "__main__",
 )
 """The rooms of the package, from the ground up: each imports only from those before it."""
 
+PAGE_ROOMS = ("look", "state", "session", "security", "storage", "browser", "widgets")
+"""The rooms of what a page is made of, whatever its mechanism, from the ground up."""
+
 APP_ROOMS = (
-    "look",
     "state",
     "session",
-    "security",
     "storage",
-    "browser",
     "widgets",
     "inputs",
     "scene",
@@ -62,8 +63,15 @@ APP_ROOMS = (
 )
 """The rooms of the page, from the ground up; features import from each other without a circle."""
 
-WITHOUT_VISER = ("app.state", "app.session", "app.storage")
-"""The parts of the app whose logic runs without a browser."""
+INNER_ROOMS = {"page": PAGE_ROOMS, "app": APP_ROOMS}
+
+UNDER_PAGE = ("errors", "files", "numerics", "page")
+"""All that the page may import that knows no mechanism."""
+
+WITHOUT_VISER = tuple(
+    f"{room}.{each}" for room in INNER_ROOMS for each in ("state", "session", "storage")
+)
+"""The parts of the page whose logic runs without a browser."""
 
 SLOW = ("numba", "trimesh", "manifold3d", "playwright")
 """Libraries to import when they are needed, since each costs about half a second."""
@@ -171,18 +179,28 @@ def test_modules_import_only_from_their_own_room_or_those_below() -> None:
     for module in MODULES:
         for name in own_imports(module):
             is_above = rank(name, ROOMS) > rank(module, ROOMS)
-            if module.startswith("app.") and name.startswith("app."):
-                own, other = module.removeprefix("app."), name.removeprefix("app.")
-                is_above = rank(other, APP_ROOMS) > rank(own, APP_ROOMS)
+            room, _, own = module.partition(".")
+            other_room, _, other = name.partition(".")
+            if room == other_room and room in INNER_ROOMS:
+                rooms = INNER_ROOMS[room]
+                is_above = rank(other, rooms) > rank(own, rooms)
             if is_above:
                 offenders.append(f"explorer.{module} imports {name} of a room above")
     assert not offenders, "\n".join(offenders)
     # No room is empty.
     assert {rank(module, ROOMS) for module in MODULES} == set(range(len(ROOMS)))
-    of_app = (name.removeprefix("app.") for name in MODULES if name.startswith("app."))
-    assert {rank(module, APP_ROOMS) for module in of_app} == set(range(len(APP_ROOMS)))
+    for room, rooms in INNER_ROOMS.items():
+        inner = [name.partition(".")[2] for name in MODULES if name.startswith(f"{room}.")]
+        assert {rank(module, rooms) for module in inner} == set(range(len(rooms)))
     # What is read is the package, not nothing.
     assert "mechanism.design" in own_imports("mechanism.kinematics")
+
+
+def test_page_knows_no_mechanism() -> None:
+    of_page = [module for module in MODULES if belongs_to(module, ("page",))]
+    names = {name for module in of_page for name in own_imports(module)}
+    assert not [name for name in sorted(names) if not belongs_to(name, UNDER_PAGE)]
+    assert names
 
 
 def test_contributors_read_of_the_rooms_in_their_order() -> None:
@@ -225,7 +243,7 @@ def test_libraries_are_imported_only_where_they_may_be() -> None:
     offenders: list[str] = []
     for module in MODULES:
         used, early = libraries(module), libraries(module, at_import=True)
-        of_page = belongs_to(module, ("app",)) and not belongs_to(module, WITHOUT_VISER)
+        of_page = belongs_to(module, ("page", "app")) and not belongs_to(module, WITHOUT_VISER)
         if "viser" in used and not of_page:
             offenders.append(f"explorer.{module} imports viser")
         if "manifold3d" in used and not belongs_to(module, MAKE_SOLIDS):

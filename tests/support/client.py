@@ -18,8 +18,8 @@ import zstandard
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from explorer.app.browser.viser_gaps import element_id, mark_broadcasts, run_script_in
 from explorer.app.server import Running
+from explorer.page.browser.viser_gaps import element_id, mark_broadcasts, run_script_in
 
 _COUNT = itertools.count()
 PATIENCE_SECONDS = 60.0

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Browser
 
-from explorer.app.browser.headless import SWIFTSHADER, headless_browser
+from explorer.page.browser.headless import SWIFTSHADER, headless_browser
 
 # The page itself is drawn by the processor at once, rather than by a renderer that imitates a
 # graphics card.

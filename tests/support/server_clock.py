@@ -10,8 +10,8 @@ from unittest import mock
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.studies.feature import StudiesPanel
 from explorer.app.page import Page
-from explorer.app.session import clock
-from explorer.app.widgets import assigning
+from explorer.page.session import clock
+from explorer.page.widgets import assigning
 
 # Seconds of the clock in a second of the machine's, and when that began there.
 _pace, _paced_at = 1.0, 0.0

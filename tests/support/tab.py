@@ -15,7 +15,6 @@ import server_clock
 import viser
 from playwright.sync_api import Browser, ConsoleMessage, Download, Locator, expect
 
-from explorer.app.browser.viser_gaps import element_id
 from explorer.app.scene.camera import ViewName, framing, has_perspective
 from explorer.app.screenshot import (
     AWAIT_FRAMES,
@@ -33,6 +32,7 @@ from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
+from explorer.page.browser.viser_gaps import element_id
 
 # Small, since what the pictures look like is tested elsewhere; panels and scene side by side.
 SIZE = (940, 540)

@@ -36,12 +36,12 @@ from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
 from explorer.app.session.session import UNDONE
-from explorer.app.session.worker import RESTARTED
 from explorer.app.state.actions import Open
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
 from explorer.mechanism.design_file import PRESETS, encode_design
+from explorer.page.session.worker import RESTARTED
 
 TABS = 3
 # Between two looks at whether the page shows its state.

@@ -25,7 +25,6 @@ from PIL import Image
 from playwright.sync_api import Browser, FloatRect, Page
 from server_clock import wait_until_drawn
 
-from explorer.app.browser.headless import headless_browser
 from explorer.app.features.compare.feature import Pin
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest
@@ -62,6 +61,7 @@ from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.mechanism.folds import pose_of_folds
 from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import CLEARANCE, PAPER_VOLUME, paper_start
+from explorer.page.browser.headless import headless_browser
 from explorer.sweep.results import load_results
 from explorer.sweep.run import run_study
 from explorer.sweep.study import STUDIES, Sampling

@@ -13,22 +13,22 @@ from typing import Any, Literal, Protocol, TypeVar
 
 import viser
 
-from explorer.app.browser.downloads import Downloads
 from explorer.app.scene.camera import Cameras
 from explorer.app.scene.placing import ScenePart
 from explorer.app.session.session import Change, HistoryMove, Session, Who
-from explorer.app.session.worker import Worker
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.storage.user_data import Autosaver, UserData
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import Buttons, copy_button, press_button
+from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import dim
-from explorer.app.widgets.palette import Command, Key
 from explorer.app.widgets.theme import Theme
 from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
 from explorer.measures.blocks.source import Source
+from explorer.page.session.worker import Worker
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import Command, Key
 
 Place = Literal["build", "analyse", "work", "dialog"]
 Side = Literal["left", "middle", "right"]

@@ -15,7 +15,6 @@ from typing import Any, Generic, Literal, TypeAlias, TypedDict, TypeVar, Unpack,
 
 import viser
 
-from explorer.app.browser.viser_gaps import MARKS, slider_marks
 from explorer.app.inputs.ranges import (
     Intervals,
     Span,
@@ -30,12 +29,13 @@ from explorer.app.state.actions import Action, Set, value_text
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.markup import colour_strip
 from explorer.errors import InputError
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import snap_to_decimals
+from explorer.page.browser.viser_gaps import MARKS, slider_marks
+from explorer.page.widgets.assigning import Update
 
 # Colour of viser by which the stylesheet tells the main button of a tab from the others.
 MAIN: Literal["blue"] = "blue"

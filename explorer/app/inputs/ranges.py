@@ -15,11 +15,11 @@ from typing import TypeAlias
 import viser
 
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
 from explorer.mechanism.configuration import Point, point_of
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
 from explorer.mechanism.feasible_intervals import Interval, possible_ranges
 from explorer.numerics.number_text import Unit
+from explorer.page.widgets.assigning import Update
 
 # Least width of a close-up over the whole range, and least part of the track that is tinted before
 # the close-up is made anew.

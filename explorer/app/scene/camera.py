@@ -16,8 +16,8 @@ from typing import Literal, get_args
 import numpy as np
 import viser
 
-from explorer.app.browser.viser_gaps import put_camera
 from explorer.numerics.arrays import FloatArray
+from explorer.page.browser.viser_gaps import put_camera
 
 ViewName = Literal["isometric", "front", "side", "top"]
 VIEWS: tuple[ViewName, ...] = get_args(ViewName)

@@ -8,9 +8,9 @@ import numpy as np
 import viser
 
 from explorer.app.scene.shapes import add_label, add_lines, add_translucent, sphere
-from explorer.app.widgets.assigning import Update
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.page.widgets.assigning import Update
 from explorer.singularity.colours import FAR, Rgb
 
 OPACITY = 0.3

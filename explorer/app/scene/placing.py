@@ -27,7 +27,7 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from explorer.app.widgets.assigning import Update
+    from explorer.page.widgets.assigning import Update
 
 # Approximate reach of a design in scene units.
 SCENE_REACH = 10.0

@@ -16,9 +16,9 @@ import viser
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import NEUTRAL
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.page.widgets.assigning import Update
 from explorer.singularity.colours import Rgb, linear
 
 # Colours of the scene, besides those of `explorer.singularity.colours`.

@@ -1,1 +1,1 @@
-"""The session, through which the state changes, and the processes that compute for it."""
+"""The session, through which the state changes."""

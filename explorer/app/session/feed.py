@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
-from explorer.app.session.clock import Pause, now
-from explorer.app.session.worker import CANCELLED, Channel, Worker
 from explorer.app.state.frame import Frame
 from explorer.numerics.search import Watch, ignore_stage
+from explorer.page.session.clock import Pause, now
+from explorer.page.session.worker import CANCELLED, Channel, Worker
 
 # Seconds after which a drawing is cancelled as soon as a newer one waits, and its stage is shown.
 LONG_SECONDS = 1.0

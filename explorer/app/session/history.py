@@ -13,11 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from explorer.app.state.actions import Action, Open, Reset, SetMode
-from explorer.app.state.presses import Press
 from explorer.app.state.state import Gesture, State
 from explorer.app.state.view import View
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.page.state.presses import Press
 
 # Number of steps beyond which the oldest are dropped.
 MOST_STEPS = 1000

@@ -12,15 +12,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from explorer.app.session.clock import moment_of
 from explorer.app.session.history import History, UserAction, restore, start_history
-from explorer.app.session.latest import LatestWins
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
-from explorer.app.state.presses import Press
 from explorer.app.state.state import State
 from explorer.errors import DesignError, ExplorerError
 from explorer.mechanism.machine import Tolerances
+from explorer.page.session.clock import moment_of
+from explorer.page.session.latest import LatestWins
+from explorer.page.state.presses import Press
 from explorer.workspace.limits.table import LIMITS
 
 # Seconds after which a thread that waits for changes looks whether the session has ended.

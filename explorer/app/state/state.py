@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from explorer.app.state.compared import Compared
 from explorer.app.state.parts import LENGTHS, STAYS, TRANSIENT, FeaturePart, in_unit
 from explorer.app.state.paths import Journey, Mode, Paths
-from explorer.app.state.presses import Press
 from explorer.app.state.view import View
 from explorer.mechanism import pose as poses, tilt_torsion as tilts
 from explorer.mechanism.configuration import Point, offset_of, point_of, position_of
@@ -29,6 +28,7 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit
+from explorer.page.state.presses import Press
 from explorer.singularity.colours import WARN_SHARE
 
 Joints = tuple[float, float, float, float, float, float]

@@ -18,12 +18,12 @@ from pathlib import Path
 
 import msgspec
 
-from explorer.app.storage.folder import data_folder, make_data_folder, newest_first, plain_words
 from explorer.errors import InputError
 from explorer.files.writing import make_folder, move, read_at_most, write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, decode_design, encode_design
 from explorer.numerics.checks import LONGEST_NAME, tidy_name
+from explorer.page.storage.folder import data_folder, make_data_folder, newest_first, plain_words
 
 # Names of the folder of designs in the user's data folder, and of the folder in it that keeps those
 # deleted or replaced.

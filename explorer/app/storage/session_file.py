@@ -27,10 +27,10 @@ from filelock import FileLock
 from explorer.app.session.history import History, Step
 from explorer.app.state.parts import FEATURE_PARTS, FeaturePart, saved_fields
 from explorer.app.state.state import State
-from explorer.app.storage.folder import data_folder, make_data_folder, newest_first, try_lock
 from explorer.errors import InputError, StorageError
 from explorer.files.json_text import one_line
 from explorer.files.writing import move, read_at_most, write_whole
+from explorer.page.storage.folder import data_folder, make_data_folder, newest_first, try_lock
 
 # Name of the folder of sessions in the user's data folder.
 SESSIONS = "sessions"

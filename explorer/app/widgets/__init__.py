@@ -1,1 +1,1 @@
-"""What panels are made of: markup, buttons, charts, the palette and the theme."""
+"""What panels are made of: markup, buttons, charts and the theme."""

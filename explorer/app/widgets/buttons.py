@@ -17,13 +17,13 @@ from html import escape
 import msgspec
 import viser
 
-from explorer.app.browser.browser_facts import decode_text
-from explorer.app.browser.viser_gaps import element_id, run_script, run_script_in
-from explorer.app.look import read_script
 from explorer.app.widgets.markup import meter, note
-from explorer.app.widgets.palette import STEP, Command, Key
 from explorer.files.extras import EXTRAS, install_command, need_of
 from explorer.measures.blocks.source import Source
+from explorer.page.browser.browser_facts import decode_text
+from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
+from explorer.page.look import read_script
+from explorer.page.widgets.palette import STEP, Command, Key
 
 MANUAL = "help.open"
 """The name of buttons that open the manual; the value is a page, with "#" and a heading or term."""

@@ -14,7 +14,7 @@ from explorer.app.state.actions import Action, Set
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import Buttons, press_button
-from explorer.app.widgets.palette import Key, with_keys
+from explorer.page.widgets.palette import Key, with_keys
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,16 @@ from collections.abc import Callable, Mapping
 
 import viser
 
-from explorer.app.browser.viser_gaps import (
+from explorer.app.session.session import Who
+from explorer.app.widgets.buttons import Buttons
+from explorer.page.browser.viser_gaps import (
     SceneMessage,
     assign_in,
     assign_properties,
     run_script,
     run_script_in,
 )
-from explorer.app.look import call_script, read_script
-from explorer.app.session.session import Who
-from explorer.app.widgets.buttons import Buttons
+from explorer.page.look import call_script, read_script
 from explorer.singularity.colours import Rgb
 
 # Colours of buttons and of the tab in front; the second is light enough for dark panels.

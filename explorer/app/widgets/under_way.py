@@ -8,9 +8,9 @@ from typing import Any
 import viser
 
 from explorer.app.session.feed import Feed
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.markup import alert
 from explorer.numerics.number_text import format_decimals
+from explorer.page.widgets.assigning import Update
 
 AnyFeed = Feed[Any, Any]
 

@@ -21,13 +21,13 @@ from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect, choose, turn
 from explorer.app.widgets.markup import box, swatch
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.widgets.assigning import Update
 
 # Largest number of designs that have a button of their own: the presets, then the last saved.
 MOST_BUTTONS = 12

@@ -18,9 +18,9 @@ from explorer.app.features.feature import Services
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import COMPARED, NO_MESH, add_label, add_lines, add_translucent
 from explorer.app.scene.surfaces import Drawn
-from explorer.app.widgets.assigning import Update
 from explorer.measures.box import corners_of
 from explorer.numerics.arrays import FloatArray
+from explorer.page.widgets.assigning import Update
 
 OPACITY = 0.3
 # Each workspace is drawn larger by this share than the one before: designs share limits, and

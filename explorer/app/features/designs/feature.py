@@ -13,25 +13,25 @@ from html import escape
 
 import viser
 
-from explorer.app.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.app.features.feature import Export, Feature, Services, Tab
 from explorer.app.inputs.controls import Bound, Controls
-from explorer.app.look import call_script, read_script
-from explorer.app.session.latest import LatestWins
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, MarkSaved, Open, SetName
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import open_geometry
 from explorer.app.state.view import View
 from explorer.app.storage.library import Entry, copy_name
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import PressHandler, open_button, press_button
 from explorer.app.widgets.markup import box, note
-from explorer.app.widgets.palette import Command
 from explorer.errors import ExplorerError, InputError
 from explorer.files.json_text import field_names
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
+from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
+from explorer.page.look import call_script, read_script
+from explorer.page.session.latest import LatestWins
+from explorer.page.widgets.assigning import Update
+from explorer.page.widgets.palette import Command
 
 # Byte order marks, the zeros of UTF-16, and blanks.
 BEFORE_JSON = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"

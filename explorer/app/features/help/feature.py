@@ -7,15 +7,15 @@ from html import escape
 
 import viser
 
-from explorer.app.browser.viser_gaps import run_script_in
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.help.manual import ManualReader
 from explorer.app.features.help.tour import TourGuide
 from explorer.app.state.frame import Frame
-from explorer.app.widgets import palette
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import MANUAL, open_button, press_button
 from explorer.app.widgets.markup import box, caption, dim
+from explorer.page.browser.viser_gaps import run_script_in
+from explorer.page.widgets import palette
+from explorer.page.widgets.assigning import Updates
 
 PRESS = "page"
 KEYS = {"Theme": (palette.shift("L"),), "Keys": (palette.Key("K"),)}

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import viser
 
-from explorer.app.browser.viser_gaps import run_script_in, show_value
 from explorer.app.features.feature import Services
-from explorer.app.look import read_script
 from explorer.app.widgets.buttons import MANUAL, press_button
-from explorer.app.widgets.palette import STEP, Command
 from explorer.files.packaged import list_pages, read_page
+from explorer.page.browser.viser_gaps import run_script_in, show_value
+from explorer.page.look import read_script
+from explorer.page.widgets.palette import STEP, Command
 
 CLOSE = "help.close"
 # Place and size of the manual's panel, in pixels.

@@ -17,11 +17,9 @@ from typing import ClassVar
 
 import viser
 
-from explorer.app.browser.viser_gaps import run_script_in
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import CancelRun, Revert, StartRun, TakePaperProblem
 from explorer.app.features.optimise.state import Optimisation, SearchRun
-from explorer.app.look import read_script
 from explorer.app.session.history import restore, start_history
 from explorer.app.state.actions import Action, GoHome, Set, SetPosition, SetVariable, move_to
 from explorer.app.state.frame import Frame
@@ -30,6 +28,8 @@ from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
 from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import PAPER_VOLUME
+from explorer.page.browser.viser_gaps import run_script_in
+from explorer.page.look import read_script
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
 # warning lengths, and the factor on a variable.

@@ -12,11 +12,9 @@ from typing import ClassVar
 import numpy as np
 import viser
 
-from explorer.app.browser.viser_gaps import run_script_in
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.workspace.feeds import VOLUME_FEED, volume_request
 from explorer.app.features.workspace.work import MeasuredVolume, Selection, measure_volume
-from explorer.app.look import read_script
 from explorer.app.scene.placing import Placed, ScenePart, outline
 from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.session.feed import Feed
@@ -26,12 +24,14 @@ from explorer.app.state.actions import Action, Open
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.storage.session_file import decode_session
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.markup import box, dim, row, table
-from explorer.app.widgets.palette import Key, with_keys
 from explorer.files.json_text import decode_text
 from explorer.numerics.number_text import drop_rounding, format_number
+from explorer.page.browser.viser_gaps import run_script_in
+from explorer.page.look import read_script
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import Key, with_keys
 
 GO = "history.go"
 # Rows of the list; the slider reaches all steps.

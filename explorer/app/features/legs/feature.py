@@ -21,7 +21,6 @@ from explorer.app.scene.shapes import (
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
 from explorer.app.widgets import charts
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.markup import alert, box, dim, row, sentence, swatch, table
@@ -35,6 +34,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_number
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import OUTLINE, Rgb
 from explorer.workspace.accessible.radii import RadiusCurve, with_radius
 

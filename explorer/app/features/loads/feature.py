@@ -22,7 +22,6 @@ from explorer.app.state.actions import Action, Set, SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import Weighed
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.markup import note
@@ -30,6 +29,7 @@ from explorer.app.widgets.under_way import problem
 from explorer.measures.blocks import forces
 from explorer.measures.blocks.block import Share, Statement
 from explorer.mechanism.machine import Guide
+from explorer.page.widgets.assigning import Updates
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, has_limits
 

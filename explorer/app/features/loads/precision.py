@@ -15,12 +15,12 @@ from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks import precision as answers
 from explorer.measures.box import PositionSet
 from explorer.mechanism.design_file import typical_machine
+from explorer.page.widgets.assigning import Updates
 from explorer.statics.budget import with_tolerances
 from explorer.statics.compliance import is_elastic
 

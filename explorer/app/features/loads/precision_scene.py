@@ -13,10 +13,10 @@ from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.scene import shapes
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.placing import Placed, ScenePart, round_step
-from explorer.app.widgets.assigning import Updates
 from explorer.measures.blocks.precision import DIGITS
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import Rgb
 from explorer.statics.compliance import is_elastic
 from explorer.statics.loaded import ToolPrecision

@@ -17,7 +17,6 @@ from explorer.app.features.loads.load import Loads, SetForce, fitting_scale, rou
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import share_colour
 from explorer.measures.blocks.block import Share
 from explorer.measures.blocks.forces import utilisations
@@ -26,6 +25,7 @@ from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_number
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import Rgb
 from explorer.statics.loaded import LoadedPose
 

@@ -21,9 +21,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import ClearMachine
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.markup import box, note
-from explorer.app.widgets.palette import NO_OPTION
 from explorer.mechanism.design import DOWN, Design
 from explorer.mechanism.machine import (
     Actuators,
@@ -36,6 +34,8 @@ from explorer.mechanism.machine import (
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_number
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import NO_OPTION
 
 # Limits that are switched on begin with these: N m and MPa; the tube in mm.
 MOMENT, STRESS = 10.0, 200.0

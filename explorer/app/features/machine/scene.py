@@ -9,9 +9,9 @@ import numpy as np
 from explorer.app.features.feature import Services, show
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
-from explorer.app.widgets.assigning import Updates
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import Rgb
 
 # Length and radius of the axes of the tool, in scene units, and thickness of its line in pixels.

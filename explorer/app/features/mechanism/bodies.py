@@ -19,10 +19,10 @@ from explorer.app.features.feature import Services, show
 from explorer.app.features.mechanism.incidences import Approach, approaches, margin_hover
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
-from explorer.app.widgets.assigning import Updates
 from explorer.legs.clearance import legs_of
 from explorer.measures.snapshot import Snapshot
 from explorer.numerics.arrays import FloatArray
+from explorer.page.widgets.assigning import Updates
 from explorer.reproduce.six_legs import TWIN
 from explorer.singularity import colours
 from explorer.singularity.colours import OUTLINE, Rgb, proximity_colour

@@ -34,13 +34,13 @@ from explorer.app.state.geometry import open_geometry, preset_of, set_unit
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import Hold, State
 from explorer.app.state.view import LengthName
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chip, Chips, Effect
 from explorer.app.widgets.markup import alert, box, note, remark
-from explorer.app.widgets.palette import NO_OPTION, Key, shift
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import NO_OPTION, Key, shift
 from explorer.workspace.limits.table import LIMITS, Entry, Limit, Switch
 
 JOINT_HINTS = {

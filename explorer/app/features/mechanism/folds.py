@@ -23,11 +23,11 @@ from explorer.app.scene.shapes import add_label, add_lines, add_translucent, of_
 from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, SetFold
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Updates
 from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.margins import signs_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import (
     FAR_WARNINGS,
     LEAVES,

@@ -22,10 +22,10 @@ import viser
 from explorer.app.features.feature import Services, show
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.widgets.assigning import Updates
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_fitted
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity import colours
 from explorer.singularity.colours import Rgb
 from explorer.singularity.ellipsoids import planes_of_singularity

@@ -12,10 +12,10 @@ from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Updates
 from explorer.errors import InputError
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
+from explorer.page.widgets.assigning import Updates
 
 # Names of the points, by the node whose frame their labels have.
 LABELS = {"/base": ("a1", "a2", "a3"), "/platform": ("b1", "b2", "b3", "b4")}

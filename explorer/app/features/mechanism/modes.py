@@ -13,15 +13,15 @@ from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
 from explorer.app.scene.shapes import GHOST, NO_MESH, add_label, add_lines, add_translucent
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, turn
 from explorer.app.widgets.markup import box
-from explorer.app.widgets.palette import Key
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_fitted
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import Key
 from explorer.workspace.limits.valid_poses import Collision, Violation
 
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))

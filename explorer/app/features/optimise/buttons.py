@@ -20,8 +20,8 @@ from explorer.app.session.session import Who
 from explorer.app.state.actions import Action
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.palette import Key, shift, with_keys
 from explorer.optimise.outcome import encode_record
+from explorer.page.widgets.palette import Key, shift, with_keys
 
 START, CANCEL = "optimise.start", "optimise.cancel"
 ACCEPT, REVERT = "optimise.accept", "optimise.revert"

@@ -29,7 +29,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import preset_of
 from explorer.app.state.state import State
 from explorer.app.widgets import charts
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import activity, open_button
 from explorer.measures.box import corners_of
 from explorer.measures.catalogue import CATALOGUE
@@ -38,6 +37,7 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
 from explorer.optimise.problem import OVER_BOX, YAW, Box, ObjectiveName, Problem
+from explorer.page.widgets.assigning import Update
 from explorer.singularity.colours import css
 from explorer.statics.compliance import is_elastic
 

@@ -15,13 +15,13 @@ from explorer.app.features.optimise.actions import Advance, CancelRun, Compare, 
 from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import optimise
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
-from explorer.app.session.worker import Worker
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import Iterate, Outcome, Settings, compare_designs, record_of
 from explorer.optimise.search.sqp import Trail
+from explorer.page.session.worker import Worker
 
 # Least seconds between two iterates on the page, and most to wait for the drawing of one.
 PACE, LONGEST = 0.07, 0.25

@@ -10,7 +10,6 @@ import msgspec
 import numpy as np
 
 from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest
-from explorer.app.session.worker import Channel
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.measure import longest_leg
@@ -19,6 +18,7 @@ from explorer.numerics import checks
 from explorer.numerics.number_text import Unit
 from explorer.optimise import conflicts, defaults, problem as problems, solver
 from explorer.optimise.outcome import Outcome
+from explorer.page.session.worker import Channel
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
 

@@ -11,27 +11,27 @@ import msgspec
 import numpy as np
 import viser
 
-from explorer.app.browser.browser_facts import decode_text
-from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Feature, Services, Tab, html_of, show_html
 from explorer.app.features.orientation import maps, work
 from explorer.app.features.workspace.slice_map import AXES, keeps_above, level_within
 from explorer.app.inputs.controls import Controls, item
 from explorer.app.inputs.ranges import Span
-from explorer.app.look import read_script
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, add_translucent
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.markup import alert, box, caption, dim, remark, row, table
 from explorer.app.widgets.under_way import UnderWay, look_of, problem
 from explorer.measures.box import corners_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import Unit, format_decimals
+from explorer.page.browser.browser_facts import decode_text
+from explorer.page.browser.viser_gaps import run_script
+from explorer.page.look import read_script
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import Rgb
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,

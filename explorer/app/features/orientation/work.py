@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from explorer.app.features.workspace.work import LIVE_TOLERANCE
 from explorer.app.session.feed import Feed, feed_of, watch_of
-from explorer.app.session.worker import Channel
 from explorer.app.state.actions import Action, move_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -26,6 +25,7 @@ from explorer.mechanism.tilt_torsion import (
 )
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.page.session.worker import Channel
 from explorer.workspace.accessible.nodes import make_cell_grid
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.orientations.share import (

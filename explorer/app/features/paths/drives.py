@@ -8,12 +8,12 @@ from explorer.app.features.feature import Services, html_of, show_html
 from explorer.app.features.paths.work import DRIVES_FEED, DrivesDrawing
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import extra_button
 from explorer.app.widgets.markup import alert, sentence
 from explorer.errors import ExplorerError
 from explorer.files.extras import is_missing
+from explorer.page.widgets.assigning import Updates
 
 KINDS = {"Off": "off", "In the shortest time": "shortest", "In a given time": "duration"}
 

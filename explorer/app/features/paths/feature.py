@@ -14,16 +14,16 @@ from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.features.paths.work import DRIVES_FEED, draw_drives
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
-from explorer.app.session.worker import Worker
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import activity, press_button
-from explorer.app.widgets.palette import Key
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import rotation_from_quaternion
 from explorer.numerics.number_text import format_decimals, format_number
+from explorer.page.session.worker import Worker
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import Key
 from explorer.paths.planning import PlannedPath
 from explorer.singularity.colours import FAR, SINGULAR
 

@@ -18,7 +18,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.paths import End, PathKind
 from explorer.app.state.state import State, angles_of
 from explorer.app.widgets import markup
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import extra_button, press_button
 from explorer.app.widgets.chips import Chip, Chips, choose
 from explorer.errors import InputError
@@ -33,6 +32,7 @@ from explorer.numerics.number_text import (
     format_number,
     snap_to_decimals,
 )
+from explorer.page.widgets.assigning import Updates
 
 EndName = Literal["start", "goal"]
 ENDS: tuple[EndName, ...] = ("start", "goal")

@@ -18,7 +18,6 @@ from explorer.app.features.loads.load import Loads
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.charts import (
     BLUE,
     NEUTRAL,
@@ -36,6 +35,7 @@ from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS, Unit, format_decimals, format_number
+from explorer.page.widgets.assigning import Updates
 from explorer.paths.loads import DemandedLoad, PathLoads
 from explorer.singularity.colours import MARGIN_COLOURS
 from explorer.statics.reactions import PART_NAMES, has_limits

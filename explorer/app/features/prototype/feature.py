@@ -20,13 +20,13 @@ from explorer.app.scene.surfaces import Drawn
 from explorer.app.session.session import Who
 from explorer.app.state.actions import draw_as
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
 from explorer.errors import ExplorerError
 from explorer.measures.box import corners_of
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
+from explorer.page.widgets.assigning import Updates
 from explorer.prototype.assembly import exploded_offsets
 from explorer.prototype.chains import BODIES, LEGS, Places
 from explorer.prototype.fitting import broken_joint_limits, buildability

@@ -10,7 +10,6 @@ from html import escape
 import numpy as np
 import viser
 
-from explorer.app.browser.downloads import File
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
 from explorer.app.features.optimise.state import Optimisation
 from explorer.app.features.paths.work import request_for
@@ -21,8 +20,8 @@ from explorer.app.scene.camera import has_perspective
 from explorer.app.scene.placing import scene_scale
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import extra_button, open_button, press_button
+from explorer.app.widgets.downloads import File
 from explorer.app.widgets.markup import box
 from explorer.export.controller import kernel_files
 from explorer.export.drawings.figure import COLUMN, PAGE, figure_svg
@@ -32,6 +31,7 @@ from explorer.export.moving_page import moving_page
 from explorer.files.extras import is_missing
 from explorer.files.writing import zip_bytes
 from explorer.mechanism.design import Design
+from explorer.page.widgets.assigning import Update
 
 PRESS = "export"
 PICTURES: dict[str, tuple[int, int] | float] = {

@@ -54,7 +54,7 @@ def make_report(
 
 
 def _print(html: str) -> bytes:
-    from explorer.app.browser.headless import headless_browser
+    from explorer.page.browser.headless import headless_browser
 
     with headless_browser() as browser:
         # A report has no scripts and fetches nothing; the browser ensures that.

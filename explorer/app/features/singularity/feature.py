@@ -18,11 +18,9 @@ from explorer.app.inputs.ranges import length_span
 from explorer.app.state.folds import FIRST_FOLD
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import Gain, Ghost
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure, press_button
 from explorer.app.widgets.markup import box, caption, dim, margin_name, meter, swatch, ticks
-from explorer.app.widgets.palette import shift
 from explorer.measures.blocks import singularity as blocks
 from explorer.measures.blocks.block import Column, Facts, Statement, head_of
 from explorer.measures.blocks.source import pose_source
@@ -30,6 +28,8 @@ from explorer.measures.verdict import DISTANCE_SHARE, warnings
 from explorer.mechanism.folds import FOLD_LINES, FOLDS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
 from explorer.numerics.number_text import format_decimals, format_fitted
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import shift
 from explorer.singularity import colours, strata
 from explorer.singularity.strata import GENERIC, Stratum
 

@@ -13,15 +13,15 @@ from explorer.app.features.mechanism import bodies
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import GHOST, NO_MESH, add_label, add_lines, add_translucent, sphere
-from explorer.app.session.clock import Timer, now
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import press_button
 from explorer.measures.blocks.block import Number
 from explorer.measures.blocks.singularity import finite_gain
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.pose import Pose
+from explorer.page.session.clock import Timer, now
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import FAR, SINGULAR, Rgb, proximity_colour
 from explorer.singularity.freedoms import FreeTurn
 from explorer.singularity.nearest import NearestSingularity

@@ -13,9 +13,6 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.browser.browser_facts import decode_text
-from explorer.app.browser.downloads import File
-from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.figures import PlotName, brushes_in, reading_of, row_at
@@ -32,20 +29,23 @@ from explorer.app.features.studies.words import BUTTONS, acts, chips, head, lege
 from explorer.app.features.studies.work import study_runner
 from explorer.app.inputs.controls import At, Bound, Control, Controls
 from explorer.app.inputs.ranges import Span
-from explorer.app.look import call_script, read_script
 from explorer.app.session.session import Change, Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, PressHandler, activity, press_button
 from explorer.app.widgets.chips import Chip, Chips, turn
+from explorer.app.widgets.downloads import File
 from explorer.app.widgets.markup import alert, beside
-from explorer.app.widgets.palette import NO_OPTION
 from explorer.errors import ExplorerError
 from explorer.files.extras import check_extra, is_missing
 from explorer.measures.catalogue import measures_in
 from explorer.numerics.number_text import format_number
+from explorer.page.browser.browser_facts import decode_text
+from explorer.page.browser.viser_gaps import run_script, run_script_in
+from explorer.page.look import call_script, read_script
+from explorer.page.widgets.assigning import Update
+from explorer.page.widgets.palette import NO_OPTION
 from explorer.sweep.results import csv_bytes, load_results, parquet_bytes
 from explorer.sweep.study import NAMES, decode_study
 

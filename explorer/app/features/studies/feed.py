@@ -17,12 +17,12 @@ import numpy as np
 from explorer.app.features.studies.figures import PlotRows, lines_html, points_html, select_rows
 from explorer.app.features.studies.folders import StudyFolders, study_in
 from explorer.app.features.studies.state import Studies, StudyPlan
-from explorer.app.session.latest import LatestWins
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import View
 from explorer.errors import ExplorerError, InputError
 from explorer.numerics.arrays import BoolArray, IntArray
 from explorer.numerics.number_text import Unit, format_number
+from explorer.page.session.latest import LatestWins
 from explorer.sweep.parts import pyarrow
 from explorer.sweep.results import Results, costs, load_results
 

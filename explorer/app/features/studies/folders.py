@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from explorer.app.features.feature import Services
-from explorer.app.storage.folder import make_data_folder, plain_words
 from explorer.errors import InputError
 from explorer.files.writing import read_at_most, write_whole
+from explorer.page.storage.folder import make_data_folder, plain_words
 from explorer.sweep.parts import BadPartError, part_paths, read_part
 from explorer.sweep.study import LARGEST_FILE, Study, decode_study, encode_study
 

@@ -14,10 +14,10 @@ from explorer.app.features.studies.feed import StudyFeed
 from explorer.app.features.studies.folders import keep_study, study_folders, study_in
 from explorer.app.features.studies.state import Studies, StudyPlan, study_around
 from explorer.app.session.session import Session, Who
-from explorer.app.session.worker import Channel, Worker
 from explorer.errors import ExplorerError
 from explorer.files.extras import check_extra
 from explorer.mechanism.design import Design
+from explorer.page.session.worker import Channel, Worker
 from explorer.sweep.run import Progress, run_study
 from explorer.sweep.study import Study
 from explorer.sweep.workers import LocalWorkers, cores

@@ -17,13 +17,13 @@ from explorer.app.state.actions import Action, Set, draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import DrawnAs
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect
 from explorer.app.widgets.markup import box
-from explorer.app.widgets.palette import Key, shift, with_keys
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import Key, shift, with_keys
 from explorer.reproduce.six_legs import TWIN
 from explorer.singularity.colours import Rgb
 

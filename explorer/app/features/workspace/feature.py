@@ -10,30 +10,30 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.browser.browser_facts import decode_text
-from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab, show_html
 from explorer.app.features.workspace import feeds, words as texts, work
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
 from explorer.app.inputs.controls import At, Bound, Controls
 from explorer.app.inputs.ranges import Span, coordinate_span, fine_step, round_up
-from explorer.app.look import call_script, read_script
 from explorer.app.scene.surfaces import Measure
 from explorer.app.session.session import Change
 from explorer.app.state.actions import Action, Set, SetPose, StartThere
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
-from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chip, Chips, Effect, turn
 from explorer.app.widgets.markup import alert, box, note, sentence
-from explorer.app.widgets.palette import Key, shift
 from explorer.app.widgets.under_way import UnderWay, look_of
 from explorer.measures.verdict import warnings
 from explorer.mechanism.margins import MARGIN_KINDS
 from explorer.mechanism.pose import Pose, Triple
+from explorer.page.browser.browser_facts import decode_text
+from explorer.page.browser.viser_gaps import run_script, run_script_in
+from explorer.page.look import call_script, read_script
+from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import Key, shift
 from explorer.workspace.position_bands import LOAD_MEASURES, MEASURE_WORDS
 
 SHOWN = {

@@ -14,9 +14,9 @@ from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, Patch, add_label, add_lines, add_translucent
 from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Drawn, Shell
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Updates
 from explorer.measures.box import corners_of
 from explorer.numerics.arrays import FloatArray
+from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import OUTLINE, Rgb, band_colours, proximity_colour
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.faces.surfaces import Surfaces

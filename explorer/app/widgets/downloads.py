@@ -12,8 +12,8 @@ from typing import Any
 import viser
 
 from explorer.app.session.session import Who
-from explorer.app.session.worker import Worker
 from explorer.errors import ExplorerError
+from explorer.page.session.worker import Worker
 
 # Number of browsers that are waited for at the same time.
 MOST_WAITED_FOR = 4

@@ -25,11 +25,11 @@ from collections.abc import Callable, Sequence
 from logging.handlers import RotatingFileHandler
 from typing import IO, Any, NamedTuple, cast
 
-from explorer.app.session.clock import Timer
-from explorer.app.session.latest import LatestWins
 from explorer.errors import ExplorerError
 from explorer.files.packaged import SOURCES
 from explorer.numerics.compiled import warm_in_background
+from explorer.page.session.clock import Timer
+from explorer.page.session.latest import LatestWins
 
 CANCELLED = "cancelled"
 """Problem in the reply of a task that was cancelled."""
@@ -39,7 +39,7 @@ DIED_TWICE = "The worker process died over this twice; the next change starts it
 
 # Errors of a pipe to a process that has ended.
 PIPE_ERRORS = (OSError, ValueError, EOFError, pickle.UnpicklingError)
-PROGRAM = "import sys; from explorer.app.session.worker import main; main(sys.argv[1:])"
+PROGRAM = "import sys; from explorer.page.session.worker import main; main(sys.argv[1:])"
 # Largest number of characters of each argument's text in the log.
 MOST_TEXT = 2_000
 

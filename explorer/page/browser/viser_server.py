@@ -22,10 +22,10 @@ from viser._messages import (
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 from viser.infra._messages import Message
 
-from explorer.app.browser.client_page import ClientPage
-from explorer.app.browser.sending import Sending
-from explorer.app.security import Serve
 from explorer.errors import ServerError
+from explorer.page.browser.client_page import ClientPage
+from explorer.page.browser.sending import Sending
+from explorer.page.security import Serve
 
 # Size in bytes beyond which no upload is read; no purpose of the page needs as much.
 LARGEST_UPLOAD = 32_000_000

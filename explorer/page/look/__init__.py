@@ -10,7 +10,7 @@ import msgspec
 
 from explorer.files.packaged import packaged_file
 
-FOLDER = "app/look"
+FOLDER = "page/look"
 
 
 def read_script(name: str, *arguments: object) -> str:

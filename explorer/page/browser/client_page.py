@@ -19,7 +19,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from explorer.app.look import read_file, read_script
+from explorer.page.look import read_file, read_script
 
 Answer = Callable[[ServerConnection, Request], Response | None]
 """Answers a request by HTTP; None where it opens a websocket."""

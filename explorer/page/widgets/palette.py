@@ -16,8 +16,8 @@ from typing import Any, Literal
 
 import viser
 
-from explorer.app.browser.viser_gaps import resend
-from explorer.app.widgets.assigning import Update
+from explorer.page.browser.viser_gaps import resend
+from explorer.page.widgets.assigning import Update
 
 # Separator of the parts of a command's name, from the tab to the option.
 STEP = " › "

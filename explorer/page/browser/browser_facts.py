@@ -13,10 +13,10 @@ from typing import TypeVar
 import msgspec
 import viser
 
-from explorer.app.browser.viser_gaps import element_id, run_script_in
-from explorer.app.look import read_script
-from explorer.app.session.clock import moment_of
-from explorer.app.state.presses import Presses
+from explorer.page.browser.viser_gaps import element_id, run_script_in
+from explorer.page.look import read_script
+from explorer.page.session.clock import moment_of
+from explorer.page.state.presses import Presses
 
 Described = TypeVar("Described")
 

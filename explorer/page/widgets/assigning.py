@@ -14,8 +14,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.browser.viser_gaps import PLACE, assign_properties, place, resend, show_value
 from explorer.numerics.arrays import FloatArray
+from explorer.page.browser.viser_gaps import PLACE, assign_properties, place, resend, show_value
 
 Update: TypeAlias = tuple[Any, str, object]
 """A handle, the property to assign, and its value; all updates are computed before any is made."""

@@ -1,0 +1,1 @@
+"""What a page in viser is made of, whatever mechanism it shows."""

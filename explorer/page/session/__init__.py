@@ -1,0 +1,1 @@
+"""Clocks, queues and the process that computes for the page."""

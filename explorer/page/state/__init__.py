@@ -1,0 +1,1 @@
+"""What an action may know of the control that asked for it."""

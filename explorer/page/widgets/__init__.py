@@ -1,0 +1,1 @@
+"""How controls get their values, and the palette of commands."""
