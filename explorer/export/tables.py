@@ -12,6 +12,7 @@ from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import Unit
 from explorer.paths.drives import Drives
 from explorer.paths.trajectory import Trajectory
 from explorer.statics.accuracy import IS_TILT, SOURCES
@@ -37,7 +38,7 @@ def drives_csv(drives: Drives, trajectory: Trajectory) -> str:
     head, columns = _columns(trajectory, 1.0)
     rows = drives.at(trajectory.time)
     for name, unit in (("speed", "mm/s"), ("force", "N"), ("power", "W")):
-        head += [f"{joint} {name} [{unit}]" for joint in JOINTS]
+        head += [Unit(unit).head(f"{joint} {name}") for joint in JOINTS]
         columns.append(getattr(rows, name))
     return _csv(head, np.column_stack(columns).tolist())
 
@@ -85,8 +86,8 @@ def tolerance_csv(costs: SourceCosts) -> str:
 
 def length_heads(names: Iterable[str], unit_mm: float) -> list[str]:
     """Return headings of lengths in design units, such as "l1 [10 mm]"."""
-    unit = "mm" if unit_mm == 1.0 else f"{repr(unit_mm).removesuffix('.0')} mm"
-    return [f"{name} [{unit}]" for name in names]
+    unit = Unit("mm" if unit_mm == 1.0 else f"{repr(unit_mm).removesuffix('.0')} mm")
+    return [*map(unit.head, names)]
 
 
 def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:

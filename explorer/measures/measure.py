@@ -18,8 +18,8 @@ from explorer.measures.box import BoxStatics
 from explorer.measures.snapshot import PoseIndices
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics import number_text
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import Unit
 from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of, least_margins
@@ -206,7 +206,6 @@ Place = Literal["compare", "optimise", "studies", "workspace", "report"]
 `explorer workspace`, or the report."""
 
 Sense = Literal["more", "less"]
-Unit = Literal["", "°", "share", "N m", "kg", "m/s²", "mm/N"]
 Cost = Literal["low", "high"]
 NEEDS: Mapping[str, tuple[str, Callable[[Case], bool]]] = {
     "box": ("required box", lambda case: case.box is not None),
@@ -238,7 +237,7 @@ class Measure:
         function: Value of a case; NaN where there is none.
         title: Name among several volumes of the workspace; the label if empty.
         power: Exponent of length in the unit; 3 for a volume.
-        unit: Unit of a measure without length; a share is from 0 to 1.
+        unit: Name of the unit of a measure without length; a "share" is from 0 to 1.
         sense: Whether more or less of it is better; None if neither is.
         cost: "high" if it takes far longer than the exact volume.
         is_whole: Whether it is a count.
@@ -256,7 +255,7 @@ class Measure:
     function: Callable[[Case], float]
     title: str = ""
     power: int = 0
-    unit: Unit = ""
+    unit: str = ""
     sense: Sense | None = None
     cost: Cost = "low"
     is_whole: bool = False
@@ -271,11 +270,11 @@ class Measure:
         """The title, or the label of a measure that has none."""
         return self.title or self.label
 
-    def unit_in(self, lengths: number_text.Unit, size: float = 0.0) -> number_text.Unit:
+    def unit_in(self, lengths: Unit, size: float = 0.0) -> Unit:
         """Return the unit, given that of lengths; its name is "" for a plain number or a share.
 
         The size, in design units, is that of `Unit.to_power`.
         """
         if self.power:
             return lengths.to_power(self.power, size)
-        return number_text.Unit("" if self.unit == "share" else self.unit, 1.0)
+        return Unit("" if self.unit == "share" else self.unit)

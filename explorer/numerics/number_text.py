@@ -31,15 +31,15 @@ ROUNDING = 1e-12
 
 
 class Unit(NamedTuple):
-    """A unit in which lengths or volumes are written for people.
+    """A unit in which values are written for people.
 
     Attributes:
-        name: Its name, such as "mm".
-        factor: Value of one design unit, or of its cube, in this unit.
+        name: Its name, such as "mm"; "" for a plain number.
+        factor: Number in this unit of a value of 1: of one design unit, or of a power of it.
     """
 
     name: str
-    factor: float
+    factor: float = 1.0
 
     def convert(self, value: float) -> float:
         """Return a value in this unit, given one in design units.
@@ -54,7 +54,11 @@ class Unit(NamedTuple):
 
     def text(self, value: float, digits: int = 4, *, size: float = 0.0) -> str:
         """Return a value for people, given in design units as its size is."""
-        return f"{self.number(value, digits, size=size)} {self.name}"
+        return f"{self.number(value, digits, size=size)} {self.name}".rstrip()
+
+    def head(self, words: str) -> str:
+        """Return the head of a column or an axis of values in this unit, such as "l1 [mm]"."""
+        return f"{words} [{self.name}]" if self.name else words
 
     def number(self, value: float, digits: int = 4, *, size: float = 0.0) -> str:
         """Return the number of `text` alone."""
@@ -75,7 +79,7 @@ class Unit(NamedTuple):
         return Unit(f"{self.name}{POWERS[power]}", self.factor**power)
 
 
-UNITS = Unit("units", 1.0)
+UNITS = Unit("units")
 """The design unit itself."""
 
 

@@ -189,8 +189,7 @@ def csv_bytes(results: Results, lengths: Unit) -> bytes:
     goal = "" if polish is None else goals[polish.objective]
     for name, values in results.columns.items():
         unit = unit_of(goal if name == "objective" else name.removeprefix(SAMPLE), lengths)
-        head = f"{name} [{unit.name}]" if unit.name else name
-        columns[head] = values if unit.factor == 1.0 else unit.factor * values
+        columns[unit.head(name)] = values if unit.factor == 1.0 else unit.factor * values
     (csv,) = load_extra("study", "pyarrow.csv")
     return _table_bytes(columns, csv.write_csv)
 
@@ -200,10 +199,10 @@ def unit_of(name: str, lengths: Unit) -> Unit:
     if name in CATALOGUE:
         return CATALOGUE[name].unit_in(lengths, math.inf)
     if name in MACHINE and MACHINE[name].unit != UNITS.name:
-        return Unit(MACHINE[name].unit, 1.0)
+        return Unit(MACHINE[name].unit)
     if name in NAMES and name != YAW:
         return lengths
-    return Unit("°" if name == YAW else "", 1.0)
+    return Unit("°" if name == YAW else "")
 
 
 def _table_bytes(columns: Mapping[str, Column], write: Callable[[Any, io.BytesIO], None]) -> bytes:

@@ -21,8 +21,7 @@ from explorer.singularity.colours import Rgb
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
-PERCENT = 100.0
-PER_CENT = Unit("%", 1.0)
+PER_CENT = Unit("%", 100.0)
 # Digits of the largest value of a row, of which four are decimals at most.
 DIGITS, MOST_DECIMALS = 6, 4
 # The measures that begin a group of rows.
@@ -86,9 +85,8 @@ class Column:
         return COMPARED[self.number]
 
     def own_value(self, measure: Measure) -> float | None:
-        """Return a value in the design's own units, shares in per cent; None if it is unknown."""
-        value = None if self.measured is None else self.measured[measure.name]
-        return PERCENT * value if value is not None and measure.unit == "share" else value
+        """Return a value in the design's own units; None if it is unknown."""
+        return None if self.measured is None else self.measured[measure.name]
 
     def has(self, measure: Measure) -> bool:
         """Whether the design has what a measure needs, such as a load."""
@@ -270,7 +268,7 @@ def _exact_text(measure: Measure, column: Column) -> str:
     if measure.names:
         return value_text(measure, value, value)
     if measure.power == 0:
-        return column.unit_of(measure).text(value, 12).strip()
+        return column.unit_of(measure).text(value, 12)
     size, units = column.design.reach**3, (number_text.UNITS, column.design.millimetres)
     return " = ".join(unit.to_power(measure.power, size).text(value, 12) for unit in units)
 

@@ -255,7 +255,9 @@ class OptimisePlots:
             yield caption, "visible", curve is not None
             yield chart, "visible", curve is not None
             if run is not None and curve is not None:
-                unit = _unit_of(run.problem, curve, state)
+                is_plain = curve.kind == "spare" or curve.powers
+                goal = "match-volume" if curve.kind == "volume" else run.problem.objective
+                unit = Unit("") if is_plain else goal_unit(goal, state)
                 level = None if curve.level is None else unit.factor * curve.level
                 shown = replace(curve, values=unit.factor * curve.values, level=level)
                 name = escape(_name(run.problem, iterates[-1], shown, unit))
@@ -270,13 +272,6 @@ def charted_iterates(run: SearchRun) -> list[Iterate]:
         return []
     start = (run.best or run.iterates[-1]).run
     return [iterate for iterate in run.iterates if iterate.run == start]
-
-
-def _unit_of(problem: Problem, curve: Curve, state: State) -> Unit:
-    if curve.kind == "volume":
-        return state.unit_of(3)
-    is_plain = curve.kind == "spare" or curve.powers
-    return Unit("", 1.0) if is_plain else goal_unit(problem, state)
 
 
 def _name(problem: Problem, last: Iterate, curve: Curve, unit: Unit) -> str:

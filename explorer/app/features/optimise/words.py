@@ -87,18 +87,18 @@ def search_notice(state: State) -> Notice | None:
 
 def _reached_text(problem: problems.Problem, iterate: Iterate, state: State) -> str:
     """Return what a search has reached: the volume that it matches, or the objective."""
+    unit = goal_unit(problem.objective, state)
     if problem.objective == "match-volume":
-        return f"volume {state.unit_of(3).text(iterate.volume, 5)}"
+        return f"volume {unit.text(iterate.volume, 5)}"
     name = OBJECTIVE_SYMBOLS[problem.objective]
     if iterate.objective is None:
         return f"{name} infinite"
-    return f"{name} {goal_unit(problem, state).text(iterate.objective, 6)}"
+    return f"{name} {unit.text(iterate.objective, 6)}"
 
 
-def goal_unit(problem: problems.Problem, state: State) -> Unit:
-    """Return the unit in which the objective of a problem is shown."""
-    goal = CATALOGUE[GOALS[problem.objective]]
-    return goal.unit_in(state.unit, state.design.reach**3)
+def goal_unit(objective: problems.ObjectiveName, state: State) -> Unit:
+    """Return the unit in which the measure of an objective is shown."""
+    return CATALOGUE[GOALS[objective]].unit_in(state.unit, state.design.reach**3)
 
 
 def result_words(state: State, built: str = "") -> str:

@@ -140,10 +140,6 @@ class PlotRows:
         """Return the values of all rows."""
         return np.asarray(self.results.columns[name], dtype=np.float64)
 
-    def unit_of(self, name: str) -> Unit:
-        """Return the unit in which the values of an axis are written."""
-        return unit_of(name, self.lengths)
-
     def title_of(self, name: str) -> str:
         """Return the title of an axis as HTML."""
         return f'<span class="title">{escape(state.title_of(name, self.lengths))}</span>'
@@ -276,7 +272,7 @@ def reading_of(plotted: PlotRows, plot: PlotName, row: int | None) -> tuple[str,
         return "", ""
     values = [(name, float(plotted.column(name)[row])) for name in plotted.axes_of(plot)]
     words = ", ".join(
-        f"{state.label_of(name)} {plotted.unit_of(name).text(value)}".rstrip()
+        f"{state.label_of(name)} {unit_of(name, plotted.lengths).text(value)}"
         for name, value in values
     )
     index = plotted.results.columns["index"][row]
@@ -291,7 +287,7 @@ def path_of(places: FloatArray) -> str:
 
 def ticks_of(plotted: PlotRows, name: str) -> FloatArray:
     """Return the values of an axis within its ends that are round in its unit, ascending."""
-    factor = plotted.unit_of(name).factor
+    factor = unit_of(name, plotted.lengths).factor
     low, high = (end * factor for end in plotted.ends[name])
     if plotted.is_logarithmic(name) and high > 10.0 * low:
         powers = np.arange(math.floor(math.log10(low)), math.ceil(math.log10(high)))
@@ -315,7 +311,7 @@ def lines_html(plotted: PlotRows) -> str:
     titles = "".join(map(plotted.title_of, names))
     least, most = (
         "".join(
-            f"<span>{plotted.unit_of(name).number(plotted.ends[name][end], 3)}</span>"
+            f"<span>{unit_of(name, plotted.lengths).number(plotted.ends[name][end], 3)}</span>"
             for name in names
         )
         for end in (0, 1)
@@ -330,7 +326,7 @@ def lines_html(plotted: PlotRows) -> str:
 def points_html(plotted: PlotRows) -> str:
     """Return the plot of two variables or measures, with a point for each design."""
     across, up = (ticks_of(plotted, name) for name in (plotted.across, plotted.up))
-    onward, upward = plotted.unit_of(plotted.across), plotted.unit_of(plotted.up)
+    onward, upward = unit_of(plotted.across, plotted.lengths), unit_of(plotted.up, plotted.lengths)
     x, y = plotted.place_of(plotted.across, across), plotted.place_of(plotted.up, up)
     grid = [[(at, 0.0), (at, 1.0)] for at in x] + [[(0.0, at), (1.0, at)] for at in y]
     columns, rows = _ranges(plotted, plotted.across), _ranges(plotted, plotted.up)

@@ -237,8 +237,7 @@ def label_of(name: str) -> str:
 
 def title_of(name: str, lengths: Unit) -> str:
     """Return the title of an axis, with its unit, given that of lengths."""
-    unit = unit_of(name, lengths).name
-    return f"{label_of(name)} [{unit}]" if unit else label_of(name)
+    return unit_of(name, lengths).head(label_of(name))
 
 
 def _toggle(order: tuple[str, ...], chosen: tuple[str, ...], name: str) -> tuple[str, ...]:

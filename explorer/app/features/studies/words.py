@@ -185,7 +185,7 @@ def legend(drawing: StudyDrawing) -> str:
     plotted = drawing.plotted
     if plotted is None:
         return ""
-    unit = plotted.unit_of(plotted.colour)
+    unit = unit_of(plotted.colour, plotted.lengths)
     least, most = (unit.number(end, 3) for end in plotted.ends[plotted.colour])
     bar = f'<span class="ex-legend is-inline" style="--colours:{",".join(SCALE)}"></span>'
     return (
@@ -326,10 +326,10 @@ def _hint(name: str, lengths: Unit) -> str:
 def _variable_words(name: str, lengths: Unit) -> str:
     words = {
         YAW: "the yaw of home [°]",
-        REACH: f"one maximum for all lengths [{lengths.name}]",
-        RADIUS: f"one radius for all legs [{lengths.name}]",
+        REACH: lengths.head("one maximum for all lengths"),
+        RADIUS: lengths.head("one radius for all legs"),
         **{
-            other: f"the {each.words} [{unit_of(other, lengths).name}]"
+            other: unit_of(other, lengths).head(f"the {each.words}")
             for other, each in MACHINE.items()
         },
     }
