@@ -38,11 +38,12 @@ from .mechanism.pose import (
     rotation_from_yaw_pitch_roll as rotation_from_yaw_pitch_roll,
     yaw_pitch_roll_from_rotation as yaw_pitch_roll_from_rotation,
 )
+from .motion.dynamics import inverse_dynamics as inverse_dynamics
+from .motion.rates import joint_accelerations as joint_accelerations, joint_rates as joint_rates
 from .optimise.defaults import make_problem as make_problem
 from .optimise.solver import optimise_design as optimise_design
 from .paths.planning import plan_path as plan_path
 from .prototype.assembly import make_prototype as make_prototype
-from .prototype.dynamics import inverse_dynamics as inverse_dynamics
 from .singularity.ellipsoids import performance as performance
 from .singularity.nearest import nearest_singularities as nearest_singularities
 from .singularity.strata import stratum as stratum
@@ -56,7 +57,6 @@ from .statics.forces import (
     largest_force as largest_force,
     strut_bending as strut_bending,
 )
-from .statics.motion import joint_accelerations as joint_accelerations, joint_rates as joint_rates
 from .statics.reactions import largest_payload as largest_payload, reactions as reactions
 from .sweep.results import load_results as load_results
 from .sweep.run import run_study as run_study

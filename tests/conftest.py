@@ -22,6 +22,7 @@ RINGS = {
         "mechanism",
         "singularity",
         "legs",
+        "motion",
         "statics",
         "workspace",
         "measures",

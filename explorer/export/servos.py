@@ -18,12 +18,12 @@ from explorer.errors import NoAnswerError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, STRUT_ROWS, Design
 from explorer.mechanism.kinematics import inverse
+from explorer.motion.inverse_jacobian import forces_of, twists_of_actuators
+from explorer.motion.masses import Mass, moving_bodies
+from explorer.motion.weights import carry
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.prototype.weights import Mass, moving_bodies
 from explorer.statics.compliance import softness_with_struts
-from explorer.statics.forces import forces_of, twists_of_actuators
-from explorer.statics.weights import carry
 from explorer.workspace.limits.table import joint_ranges
 
 FREQUENCY = 200.0

@@ -32,10 +32,10 @@ from explorer.errors import InputError
 from explorer.export.servos import droop_text, servos_of, strokes_of
 from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.machine import Guide
+from explorer.motion.chains import ACTUATED, BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Chains
+from explorer.motion.masses import BALL, DENSITY, ROD, Mass, bar_masses, leg_radii, with_payload
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Chains
 from explorer.prototype.imperfect import ImperfectMachine
-from explorer.prototype.weights import BALL, DENSITY, ROD, Mass, bar_masses, leg_radii, with_payload
 from explorer.statics.accuracy import SOURCES, source_errors
 from explorer.statics.compliance import is_elastic
 

@@ -19,14 +19,13 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import SINGULAR, margins
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.weights import MovingBodies, payload_wrench
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.statics import compliance, slopes
 from explorer.statics.accuracy import ToolError, actuator_errors, worst_errors
-from explorer.statics.forces import SINGULAR
 from explorer.statics.reactions import Reactions, largest_accelerations, limit_shares, reactions
-from explorer.statics.weights import MovingBodies, payload_wrench
 from explorer.workspace.least_clearance import node_measures
 
 BOX_NODES = 9

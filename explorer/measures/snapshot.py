@@ -19,6 +19,7 @@ from explorer.mechanism.folds import assembly_modes
 from explorer.mechanism.kinematics import determinant, jacobian_factors, tetrahedron_volumes
 from explorer.mechanism.margins import describe_modes, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
+from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.numerics.arrays import FloatArray, lengths_of, triple
 from explorer.singularity.freedoms import FlagGaps, Freedoms, flag_gaps, freedoms, least_turns
 from explorer.singularity.nearest import (
@@ -28,7 +29,6 @@ from explorer.singularity.nearest import (
     singularities_of,
 )
 from explorer.singularity.strata import GENERIC, incidences, inversions, stratum_of
-from explorer.statics.forces import twists_of_actuators
 from explorer.workspace.limits.valid_poses import Collision, Violation, violations
 
 

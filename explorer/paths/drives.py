@@ -22,12 +22,12 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.inverse_jacobian import forces_of
+from explorer.motion.masses import DENSITY, bar_masses, moving_bodies
+from explorer.motion.weights import MovingBodies, carry
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.shortest_time import SINGULAR, law_of_shortest_time
 from explorer.paths.time_law import Motion, TimeLaw, law_at_speed
-from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies
-from explorer.statics.forces import forces_of
-from explorer.statics.weights import MovingBodies, carry
 from explorer.workspace.limits.valid_moves import LARGEST_TURN, moves_are_valid
 from explorer.workspace.limits.valid_poses import violations
 

@@ -22,11 +22,11 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.inverse_jacobian import load_array, twists_of_actuators
+from explorer.motion.weights import FIRST_MOMENT, ROD, ROD_CENTRE, TOTAL, MovingBodies
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, lengths_of, rotate
 from explorer.paths.crossings import PathMargins, path_margins
-from explorer.statics.forces import load_array, twists_of_actuators
 from explorer.statics.reactions import LIMITED, Reactions, limit_shares, reactions
-from explorer.statics.weights import FIRST_MOMENT, ROD, ROD_CENTRE, TOTAL, MovingBodies
 
 # Difference of bound and largest share, over that share, at which halving ends; and rounding.
 TOLERANCE, ROUNDING = 0.02, 1e-9
@@ -180,7 +180,7 @@ class DemandedLoad:
             change = rotate(asked, forces) + angle * (speeds[:, :, 6:] @ sizes)
             change += angle * lengths_of(twists[:, :, 0, 3:]) * lengths_of(self.load[3:])
             # The weights of the legs act at their joints, partly across the legs, with the first
-            # moment over the length that `explorer.statics.weights.leg_inertia` swings.
+            # moment over the length that `explorer.motion.weights.leg_inertia` swings.
             leaning = np.abs(legs[:, FIRST_MOMENT] - legs[:, ROD] * legs[:, ROD_CENTRE])
             leaning = gravity * leaning / lengths[:, LENGTH_ROWS]
             standing = gravity * legs[:, TOTAL]

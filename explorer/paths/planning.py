@@ -27,12 +27,12 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.folds import FOLD_LINES, from_folds, to_folds, write_poses
 from explorer.mechanism.margins import INCIDENCES, mode_name
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.number_text import format_apart
 from explorer.paths import search
 from explorer.paths.loads import ROUNDING, DemandedLoad
 from explorer.singularity.strata import incidences
 from explorer.statics.reactions import PART_NAMES
-from explorer.statics.weights import MovingBodies
 from explorer.workspace.limits.quantities import valid_rows
 from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
 from explorer.workspace.limits.valid_poses import Rules, violations

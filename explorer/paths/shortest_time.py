@@ -23,11 +23,11 @@ from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
+from explorer.motion.inverse_jacobian import forces_of
+from explorer.motion.weights import MovingBodies, carry
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_apart
 from explorer.paths.time_law import PLATFORM, Intervals, TimeLaw, Travel
-from explorer.statics.forces import forces_of
-from explorer.statics.weights import MovingBodies, carry
 
 # Fewest intervals of a move, and steps of an interval after which limits are checked.
 FEWEST_INTERVALS, STEPS = 64, 10

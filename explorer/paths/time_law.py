@@ -21,9 +21,9 @@ from explorer.errors import InputError
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
+from explorer.motion.rates import joint_accelerations, joint_rates
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.roots import find_roots
-from explorer.statics.motion import joint_accelerations, joint_rates
 
 MOST_MOVES = 10_000
 # Intervals of the grid of a move as long as the reach, and the fewest and the most of any move.

@@ -5,7 +5,7 @@ loads, which are also the motions for unit rates of the actuators, times constan
 a cell such a vector is within Σ h² m / 2 of a mean of its values at the corners, with h half an
 edge of the cell and m the largest second derivative along it; so its size is at most the largest at
 a corner plus that. The derivatives are bounded term by term along the closed form of the forces of
-`explorer.statics.forces`.
+`explorer.motion.inverse_jacobian`.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.margins import planes_of_singularity
 from explorer.mechanism.pose import Triple
+from explorer.motion.weights import payload_wrench
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.numerics.cells import CellValues, corners_of_cells, largest_values
 from explorer.proofs.proof import Proof, proofs_of
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, largest_deflection, stiffness_of
 from explorer.statics.reactions import PART_NAMES, least_limits, shares_in_motion
-from explorer.statics.weights import payload_wrench
 
 # Tolerance of a proof, over the largest value allowed: what is computed keeps to the value itself.
 TOLERANCE = 1e-6

@@ -1,1 +1,1 @@
-"""The prototype: the bodies of each leg, their sizes, shapes, masses and placements."""
+"""The prototype: the sizes and shapes of the bodies of each leg, and whether they can be built."""

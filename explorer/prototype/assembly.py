@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
+from explorer.motion.chains import BODIES, LEGS, Chains, Places
+from explorer.motion.masses import Mass, total_mass
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import BODIES, LEGS, Chains, Places
 from explorer.prototype.fitting import sizes_of
 from explorer.prototype.shapes import Part, make_parts
 from explorer.prototype.sizes import Sizes, Stroke
-from explorer.prototype.weights import Mass, total_mass
 
 # The gap between layers of the exploded view: over the reach, and over the largest leg radius.
 _GAP, _GAP_IN_RADII = 0.05, 6.0

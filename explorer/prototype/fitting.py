@@ -22,10 +22,10 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.home import STEPS
 from explorer.mechanism.pose import Pose
+from explorer.motion.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.numerics.checks import MOST
 from explorer.numerics.number_text import drop_rounding, format_apart, format_number
-from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
 from explorer.prototype.sizes import (
     FIRST_SWING,
     SECOND_SWING,

@@ -20,8 +20,8 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse, joint_array
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, rotation_array
+from explorer.motion.chains import ACTUATED, Chains, Places
 from explorer.numerics.arrays import FloatArray, finite_array, position_array
-from explorer.prototype.chains import ACTUATED, Chains, Places
 from explorer.statics import accuracy
 from explorer.statics.accuracy import SOURCES
 from explorer.statics.compliance import is_elastic

@@ -1,6 +1,6 @@
 """The forms of the parts, as booleans of simple shapes that any `Kernel` can make, and as meshes.
 
-Shapes are in millimetres, each in the frame of its body (`explorer.prototype.chains`). Closed
+Shapes are in millimetres, each in the frame of its body (`explorer.motion.chains`). Closed
 meshes are made by manifold3d, which no other module of the prototype uses.
 """
 
@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from explorer.errors import ExplorerError
 from explorer.mechanism.pose import Triple
+from explorer.motion.chains import BODIES, LEGS, ON_GUIDE
+from explorer.motion.masses import Mass, mesh_mass
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE
 from explorer.prototype.sizes import CLEARANCE, LegSizes, Sizes
-from explorer.prototype.weights import Mass, mesh_mass
 from explorer.workspace.solids.solid import Solid
 
 Shape: TypeAlias = Any
@@ -238,7 +238,7 @@ def _facing(shape: Shape, sizes: Sizes) -> Shape:
 
 @dataclass(frozen=True)
 class Part:
-    """A part, such as "cylinder 2", of a body out of `explorer.prototype.chains.BODIES`.
+    """A part, such as "cylinder 2", of a body out of `explorer.motion.chains.BODIES`.
 
     Its vertices (n, 3) are in the frame of the body, in design units; its faces (m, 3) are
     counter-clockwise from outside.

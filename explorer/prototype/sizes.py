@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from explorer.legs.clearance import PAIRS, leg_axes, pair_rows
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Design
-from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
+from explorer.motion.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
 

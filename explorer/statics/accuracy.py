@@ -23,10 +23,10 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
+from explorer.motion.inverse_jacobian import A3X, A3Y, B1X, B1Y, B2, B3, twists_of_actuators
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, lengths_of
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, along, cross3, dot3, vector
-from explorer.statics.forces import A3X, A3Y, B1X, B1Y, B2, B3, twists_of_actuators
 
 # First columns of the dimensions, in the order of `DIMENSIONS`.
 A1_COLUMN, A3_COLUMN, GUIDE_COLUMN, TILT_COLUMN, B_COLUMN = 0, 3, 6, 9, 11

@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.machine import or_infinite
+from explorer.motion.inverse_jacobian import B2, B3, load_array, twists_of_actuators
 from explorer.numerics.arrays import FloatArray, finite_array, lengths_of, positive_array
 from explorer.numerics.compiled import helper, kernel
-from explorer.statics.forces import B2, B3, load_array, twists_of_actuators
 
 RIGID = "joints, carriages, guide, platform and base"
 """What counts as rigid, in words."""

@@ -16,12 +16,12 @@ import numpy as np
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import planes_of_singularity
+from explorer.motion.inverse_jacobian import B2, B3, holding_forces, is_singular
+from explorer.motion.weights import payload_wrench
 from explorer.numerics.arrays import FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import norm3
-from explorer.statics.forces import B2, B3, holding_forces, is_singular
 from explorer.statics.reactions import part_limits
-from explorer.statics.weights import payload_wrench
 
 # Least and largest value of the functions.
 LOWEST, HIGHEST = -4.0, 2.0

@@ -13,10 +13,11 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, Design
 from explorer.mechanism.machine import Payload, Six
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.inverse_jacobian import twists_of_actuators
+from explorer.motion.weights import Carried, MovingBodies, carry
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.singularity.freedoms import ZERO, free_twists
 from explorer.statics import accuracy, compliance as elasticity
-from explorer.statics.forces import twists_of_actuators
 from explorer.statics.reactions import (
     Reactions,
     has_limits,
@@ -24,7 +25,6 @@ from explorer.statics.reactions import (
     limit_shares,
     reactions,
 )
-from explorer.statics.weights import Carried, MovingBodies, carry
 
 NO_LOAD: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

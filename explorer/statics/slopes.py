@@ -15,12 +15,12 @@ import numpy as np
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, STRUT_ROWS, VARIABLES, Design
 from explorer.mechanism.machine import Payload, Tool
+from explorer.motion.inverse_jacobian import twists_of_actuators
+from explorer.motion.weights import payload_wrench
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.statics.accuracy import actuator_errors, largest_error
 from explorer.statics.compliance import largest_deflection, softness_with_struts, stiffness_of
-from explorer.statics.forces import twists_of_actuators
 from explorer.statics.reactions import part_limits
-from explorer.statics.weights import payload_wrench
 
 PARAMETERS = (*VARIABLES, "yaw", "x", "y", "z")
 """The parameters: the design variables, the yaw of the platform in radians, and b4's position."""

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
+from explorer.motion.inverse_jacobian import load_array
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.statics import load_cases
-from explorer.statics.forces import load_array
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.nodes import Grid, make_grid
 from explorer.workspace.limits.constraints import (

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
+from explorer.motion.weights import payload_wrench
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.singularity import colours
 from explorer.singularity.colours import (
@@ -34,7 +35,6 @@ from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, deflection, is_elastic, stiffness_of
 from explorer.statics.load_cases import largest_shares, load_case
 from explorer.statics.reactions import has_limits
-from explorer.statics.weights import payload_wrench
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import box_of
 

@@ -57,12 +57,12 @@ from explorer.measures.blocks.precision import tolerance_budget
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.weights import ROD
 from explorer.singularity.colours import SINGULAR
 from explorer.statics.accuracy import SOURCES, stated_tolerances
 from explorer.statics.budget import with_tolerances
 from explorer.statics.forces import actuator_forces, strut_bending
 from explorer.statics.reactions import limited_parts
-from explorer.statics.weights import ROD
 
 OPTIMAL = PRESETS["paper-optimal"]
 LIMITED = msgspec.structs.replace(

@@ -49,9 +49,9 @@ from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Payload
 from explorer.mechanism.pose import Pose
+from explorer.motion.chains import LEGS, ON_GUIDE, Places
 from explorer.page.widgets.assigning import Assigner
 from explorer.prototype.assembly import bill_of_materials, make_prototype
-from explorer.prototype.chains import LEGS, ON_GUIDE, Places
 from explorer.prototype.fitting import broken_joint_limits, buildability
 from explorer.singularity.colours import OUTLINE
 

@@ -39,12 +39,12 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.mechanism.pose import Pose
+from explorer.motion.weights import MovingBodies, payload_wrench
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS, format_number
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions
-from explorer.statics.weights import MovingBodies, payload_wrench
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.position_bands import SHARE_COLOURS, SHARES, STEP_COLOURS
 from explorer.workspace.slices.outline import slice_outline

@@ -30,10 +30,11 @@ from explorer import (
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.motion.inverse_jacobian import GUIDE_ROWS, STRUT_ROWS, twists_of_actuators
+from explorer.motion.masses import DENSITY, bar_masses, moving_bodies
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.compiled import warm
 from explorer.paths.shortest_time import law_of_shortest_time
-from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies
 from explorer.statics.accuracy import (
     actuator_errors,
     error_by_source,
@@ -47,7 +48,6 @@ from explorer.statics.compliance import (
     principal_compliances,
     stiffness_of,
 )
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, twists_of_actuators
 
 FORCE_POSES, POSES, ROUNDS = 100_000, 10_000, 10
 SHORT = {"FORCE_POSES": 500, "POSES": 100, "ROUNDS": 1}

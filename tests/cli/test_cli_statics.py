@@ -15,8 +15,9 @@ import explorer
 from explorer.measures.box import positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import typical_machine
+from explorer.motion.masses import moving_bodies
+from explorer.motion.weights import carry, payload_wrench
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.weights import moving_bodies
 from explorer.statics.accuracy import (
     SOURCES,
     actuator_errors,
@@ -29,7 +30,6 @@ from explorer.statics.accuracy import (
 from explorer.statics.budget import source_costs
 from explorer.statics.compliance import deflection, stiffness_of
 from explorer.statics.loaded import LoadedPose
-from explorer.statics.weights import carry, payload_wrench
 
 POSE = ["--position", "8", "-2.5", "11", "--yaw-pitch-roll", "-60", "12.5", "-7"]
 AT = (8.0, -2.5, 11.0), explorer.rotation_from_yaw_pitch_roll((-60.0, 12.5, -7.0))

@@ -19,9 +19,9 @@ from mesh_files import glb_json, mesh_of, metadata_of, read_3mf
 from explorer import PRESETS, Design, ExplorerError, InputError, NoAnswerError, decode_design
 from explorer.export.assembly import COLOURS, assembly_bytes
 from explorer.export.mesh import FORMATS, colour_of, mesh_bytes
+from explorer.motion.chains import CHAIN_JOINTS
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.chains import CHAIN_JOINTS
 from explorer.workspace.solids.solid import Solid, convex_hull
 from explorer.workspace.solids.solids import workspace_solid
 

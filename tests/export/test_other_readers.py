@@ -18,9 +18,9 @@ from test_simulation_scene import LOADED
 from explorer import JOINTS, Design, Pose
 from explorer.export.simulation import DENSITY, SIMULATION_JOINTS, SimulationModel
 from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.motion.chains import ACTUATED
+from explorer.motion.masses import bar_masses, moving_bodies
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import ACTUATED
-from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics.loaded import LoadedPose
 
 pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("default")]

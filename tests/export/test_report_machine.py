@@ -22,9 +22,9 @@ from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
+from explorer.motion.weights import MovingBodies
 from explorer.paths.drives import TimedPath, drives_along
 from explorer.statics.reactions import Reactions, limit_shares
-from explorer.statics.weights import MovingBodies
 from explorer.workspace.carried_region import carried_region
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]

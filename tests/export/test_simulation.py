@@ -31,10 +31,10 @@ from explorer.export.simulation import (
 )
 from explorer.mechanism.design import Swing
 from explorer.mechanism.margins import mode_of
+from explorer.motion.chains import ACTUATED, CHAIN_JOINTS, Chains
+from explorer.motion.masses import ball, bar, mesh_mass, total_mass
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.chains import ACTUATED, CHAIN_JOINTS, Chains
-from explorer.prototype.weights import ball, bar, mesh_mass, total_mass
 
 OPTIMAL = PRESETS["paper-optimal"]
 POSES = 40

@@ -30,10 +30,10 @@ from explorer.export.simulation import DENSITY, SimulationModel, simulation_mjcf
 from explorer.mechanism.design import DOWN, LENGTHS, Swing
 from explorer.mechanism.design_file import typical_machine
 from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.motion.chains import ACTUATED
+from explorer.motion.masses import bar_masses, moving_bodies
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.chains import ACTUATED
 from explorer.prototype.imperfect import ImperfectMachine
-from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics.accuracy import SOURCES
 from explorer.statics.loaded import LoadedPose
 

@@ -26,6 +26,7 @@ ROOMS = (
     "mechanism",
     "singularity",
     "legs",
+    "motion",
     "statics",
     "workspace",
     "measures",

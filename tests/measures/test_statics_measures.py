@@ -15,11 +15,11 @@ from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in, 
 from explorer.measures.measure import Case
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
+from explorer.motion.weights import MovingBodies, payload_wrench
 from explorer.numerics.number_text import Unit
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, stiffness_of
 from explorer.statics.reactions import largest_accelerations, limit_shares
-from explorer.statics.weights import MovingBodies, payload_wrench
 
 OPTIMAL = PRESETS["paper-optimal"]
 BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))

@@ -24,13 +24,13 @@ from explorer import (
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Triple
+from explorer.motion.chains import BODIES, Chains
+from explorer.motion.masses import DENSITY, bar_masses, moving_bodies, with_payload
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import triple
 from explorer.paths.crossings import path_margins
 from explorer.paths.drives import Drives, TimedPath, check_limits, drives_along
 from explorer.paths.time_law import TimeLaw, law_at_speed
-from explorer.prototype.chains import BODIES, Chains
-from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies, with_payload
-from explorer.statics.weights import MovingBodies
 
 EMPTY = PRESETS["paper-optimal"]
 OPTIMAL = msgspec.structs.replace(EMPTY, payload=Payload(2.0, (1, 0, 1)))

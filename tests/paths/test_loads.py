@@ -34,12 +34,12 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
 from explorer.paths.loads import TOLERANCE, DemandedLoad, path_loads
 from explorer.paths.planning import NoPathError, plan_path
 from explorer.statics.reactions import limit_shares, reactions
-from explorer.statics.weights import MovingBodies
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import poses_are_valid
 

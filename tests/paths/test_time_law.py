@@ -30,13 +30,13 @@ from explorer import (
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.folds import from_folds, to_folds
 from explorer.mechanism.pose import Triple
+from explorer.motion.inverse_jacobian import forces_of
+from explorer.motion.masses import bar_masses, moving_bodies
+from explorer.motion.weights import MovingBodies, carry
 from explorer.numerics.arrays import FloatArray
 from explorer.paths import shortest_time, time_law
 from explorer.paths.time_law import PLATFORM, TimeLaw, law_at_speed
 from explorer.paths.trajectory import trajectory
-from explorer.prototype.weights import bar_masses, moving_bodies
-from explorer.statics.forces import forces_of
-from explorer.statics.weights import MovingBodies, carry
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose

@@ -15,6 +15,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
+from explorer.motion.weights import MovingBodies, payload_wrench
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.cells import CellValues, largest_values
 from explorer.optimise.problem import Box
@@ -24,7 +25,6 @@ from explorer.proofs.statics import prove_deflection, prove_error, prove_load
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, largest_deflection, stiffness_of
 from explorer.statics.reactions import largest_accelerations, limit_shares, part_limits, reactions
-from explorer.statics.weights import MovingBodies, payload_wrench
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid, violations
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")

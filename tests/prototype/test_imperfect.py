@@ -32,8 +32,9 @@ from explorer.export.simulation import simulation_mjcf
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import typical_machine
 from explorer.mechanism.machine import Six
+from explorer.motion.chains import ACTUATED
+from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import ACTUATED
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.statics.accuracy import (
     SOURCES,
@@ -43,7 +44,6 @@ from explorer.statics.accuracy import (
 )
 from explorer.statics.budget import source_costs
 from explorer.statics.compliance import stiffness_of
-from explorer.statics.forces import twists_of_actuators
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 
 TOOL = (0.5, 1.0, -2.0)

@@ -23,9 +23,9 @@ from scipy.spatial.transform import Rotation
 from explorer import PRESETS, Design, InputError, Pose, leg_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
+from explorer.motion.chains import BODIES, LEGS, ON_GUIDE, Places, joints_of_leg
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, bill_of_materials, make_prototype
-from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places, joints_of_leg
 from explorer.prototype.fitting import THICKEST_SHARE, broken_joint_limits, buildability
 from explorer.prototype.shapes import Part
 from explorer.prototype.sizes import CLEARANCE, THINNEST_LEG, LegSizes, Stroke

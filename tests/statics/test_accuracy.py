@@ -25,6 +25,7 @@ from explorer import (
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import DIMENSIONS
 from explorer.mechanism.margins import mode_of
+from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import (
     SOURCES,
@@ -35,7 +36,6 @@ from explorer.statics.accuracy import (
     rms_of_sources,
     source_errors,
 )
-from explorer.statics.forces import twists_of_actuators
 
 OPTIMAL = PRESETS["paper-optimal"]
 ERRORS = np.array([0.01, 0.02, 0.015, 0.005, 0.02, 0.01])

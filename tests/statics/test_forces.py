@@ -31,12 +31,13 @@ from explorer import (
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Triple
+from explorer.motion.inverse_jacobian import twists_of_actuators
+from explorer.motion.weights import MovingBodies, carry
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
-from explorer.statics.forces import twists_of_actuators, worst_direction
+from explorer.statics.forces import worst_direction
 from explorer.statics.reactions import limit_shares
 from explorer.statics.slopes import PARAMETERS, twist_slopes
-from explorer.statics.weights import MovingBodies, carry
 
 OPTIMAL = PRESETS["paper-optimal"]
 LIMITED = msgspec.structs.replace(

@@ -13,6 +13,7 @@ from statics_cases import random_poses
 
 from explorer import Actuators, Configuration, Design, Guide, Payload, Struts, inverse_dynamics
 from explorer.mechanism.pose import Pose
+from explorer.motion.weights import MovingBodies, carry
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.reactions import (
     largest_accelerations,
@@ -20,7 +21,6 @@ from explorer.statics.reactions import (
     limit_shares,
     reactions,
 )
-from explorer.statics.weights import MovingBodies, carry
 
 REST = np.zeros(6)
 

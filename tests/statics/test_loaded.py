@@ -14,10 +14,10 @@ from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.pose import Pose
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import limit_shares, limited_parts, reactions
-from explorer.statics.weights import MovingBodies
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose

@@ -11,8 +11,8 @@ import numpy as np
 from explorer import PRESETS, Payload
 from explorer.mechanism.design import JOINTS, VARIABLES, Design
 from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.motion.chains import BODIES, CHAIN_JOINTS, Chains
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import BODIES, CHAIN_JOINTS, Chains
 
 engine: Any = mujoco
 

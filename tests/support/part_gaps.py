@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from manifold3d import Error, Manifold, Mesh64
 
+from explorer.motion.chains import Places
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import Places
 from explorer.prototype.shapes import Part
 
 

@@ -26,12 +26,12 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
+from explorer.motion.weights import MovingBodies, payload_wrench
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import OF_THE_MACHINE, SHIFTS, Box, ObjectiveName, Problem
 from explorer.statics import accuracy, compliance
 from explorer.statics.reactions import largest_accelerations, limit_shares, reactions
-from explorer.statics.weights import MovingBodies, payload_wrench
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 

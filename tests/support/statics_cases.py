@@ -10,9 +10,8 @@ from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import Design, margins, rotation_from_quaternion
-from explorer.numerics.arrays import FloatArray
-from explorer.statics.motion import IS_ON_GUIDE
-from explorer.statics.weights import (
+from explorer.motion.rates import IS_ON_GUIDE
+from explorer.motion.weights import (
     AXIS_X,
     FIRST_MOMENT,
     ROD,
@@ -20,6 +19,7 @@ from explorer.statics.weights import (
     TOTAL,
     MovingBodies,
 )
+from explorer.numerics.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -32,11 +32,11 @@ from explorer import (
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.margins import margins, mode_of, signs_of
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.load_cases import largest_shares as shares_of_case, load_case
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, limit_shares
-from explorer.statics.weights import MovingBodies
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.limits.constraints import constraints, satisfies, slacks
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid

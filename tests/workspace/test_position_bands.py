@@ -14,9 +14,9 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.margins import planes_of_singularity
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.reactions import limit_shares
-from explorer.statics.weights import MovingBodies
 from explorer.workspace.position_bands import (
     LOAD_MEASURES,
     MEASURE_WORDS,

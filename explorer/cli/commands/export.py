@@ -26,11 +26,11 @@ from explorer.files.extras import check_extra
 from explorer.files.writing import check_writable, make_folder, write_whole
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import JOINTS, Design
+from explorer.motion.masses import DENSITY
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_apart
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.imperfect import ImperfectMachine
-from explorer.prototype.weights import DENSITY
 from explorer.statics import accuracy
 from explorer.workspace.solids.solid import convex_hull
 from explorer.workspace.solids.solids import workspace_solid

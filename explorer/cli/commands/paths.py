@@ -19,12 +19,12 @@ from explorer.files.writing import check_writable, read_at_most
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
+from explorer.motion.masses import DENSITY
 from explorer.paths import drives, planning
 from explorer.paths.crossings import path_margins
 from explorer.paths.loads import PathLoads, path_loads
 from explorer.paths.time_law import TimeLaw, law_at_speed
 from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
-from explorer.prototype.weights import DENSITY
 from explorer.statics.reactions import LIMITED, PART_NAMES
 
 INSTEAD = values.hint("instead of --from-quaternion")

@@ -20,13 +20,13 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import DIMENSIONS, Six
-from explorer.mechanism.margins import INCIDENCES, margins
+from explorer.mechanism.margins import INCIDENCES, SINGULAR, margins
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.masses import bar_masses, moving_bodies
+from explorer.motion.weights import MovingBodies
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.weights import bar_masses, moving_bodies
 from explorer.statics import accuracy, budget as budgets, forces, loaded
 from explorer.statics.reactions import LIMITED
-from explorer.statics.weights import MovingBodies
 from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
 B4: Triple = (0.0, 0.0, 0.0)
@@ -50,7 +50,7 @@ class LoadOptions(options.JsonOptions, options.PoseOptions):
 
 def singular_error(pose: Pose, words: str) -> NoAnswerError:
     """Return the error of a singular pose, given words on what that means."""
-    least = forces.SINGULAR * float(np.linalg.norm(pose.position))
+    least = SINGULAR * float(np.linalg.norm(pose.position))
     margin = np.abs(margins(pose.position, pose.rotation))
     zero = [f"δ{k + 1} = 0: {INCIDENCES[k]}" for k in np.flatnonzero(margin <= least)]
     named = "; ".join(zero) or "a margin vanishes to rounding"

@@ -17,11 +17,11 @@ from explorer.measures.catalogue import Measurements, measure_design, measures_i
 from explorer.measures.measure import Case
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.machine import Payload, Tool
+from explorer.motion.masses import DENSITY
 from explorer.numerics.arrays import triple
 from explorer.optimise.outcome import Record
 from explorer.paths.drives import TimedPath
 from explorer.prototype.assembly import Bill, bill_of_materials, make_prototype
-from explorer.prototype.weights import DENSITY
 from explorer.statics.compliance import largest_deflection
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_workspace

@@ -17,9 +17,9 @@ from explorer.measures.blocks.clearances import pose_clearances, workspace_clear
 from explorer.measures.verdict import verdict
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Triple, yaw_pitch_roll_from_rotation
+from explorer.motion.masses import DENSITY
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.prototype.weights import DENSITY
 from explorer.singularity.colours import WARN_SHARE
 from explorer.singularity.ellipsoids import performance, singularity_free_ball
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, PairCost

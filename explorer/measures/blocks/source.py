@@ -83,7 +83,7 @@ def load_source(topic: LoadTopic, loaded: LoadedPose, density: float | None = No
         options += " --payload 0"
         arguments.append("weighs_payload=False")
     if density is not None:
-        imports.append("from explorer.prototype.weights import moving_bodies")
+        imports.append("from explorer.motion.masses import moving_bodies")
         masses = f"explorer.make_prototype(design).masses({density:g})"
         lines.append(f"own = moving_bodies(design, {masses}, payload=False)")
         arguments.append("own=own")

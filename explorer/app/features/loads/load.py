@@ -17,11 +17,11 @@ from explorer.app.state.state import State
 from explorer.measures.blocks.source import LoadTopic, Source, load_source
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_number
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import has_limits
-from explorer.statics.weights import MovingBodies
 from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
 if TYPE_CHECKING:
@@ -99,8 +99,8 @@ def weights_of_parts(request: tuple[Design, float]) -> MovingBodies:
     Raises:
         ExplorerError: The design has no prototype.
     """
+    from explorer.motion.masses import moving_bodies
     from explorer.prototype.assembly import make_prototype
-    from explorer.prototype.weights import moving_bodies
 
     design, density = request
     return moving_bodies(design, make_prototype(design).masses(density), payload=False)

@@ -19,8 +19,8 @@ from explorer.app.state.state import State
 from explorer.app.widgets.buttons import figure, press_button
 from explorer.app.widgets.markup import row, sentence, status, table
 from explorer.mechanism.design import LENGTHS, Design
+from explorer.motion.chains import LEGS
 from explorer.numerics.number_text import format_decimals
-from explorer.prototype.chains import LEGS
 from explorer.prototype.fitting import Buildability, buildability
 from explorer.prototype.sizes import Stroke
 

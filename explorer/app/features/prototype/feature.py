@@ -24,11 +24,11 @@ from explorer.app.widgets.markup import alert, box, caption, note, row, sentence
 from explorer.errors import ExplorerError
 from explorer.measures.box import corners_of
 from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.motion.chains import BODIES, LEGS, Places
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.page.widgets.assigning import Updates
 from explorer.prototype.assembly import exploded_offsets
-from explorer.prototype.chains import BODIES, LEGS, Places
 from explorer.prototype.fitting import broken_joint_limits, buildability
 from explorer.singularity.colours import (
     BALL,

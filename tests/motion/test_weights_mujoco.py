@@ -16,9 +16,9 @@ from explorer.export.simulation import DENSITY, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN
 from explorer.mechanism.machine import STANDARD_GRAVITY
-from explorer.prototype.chains import ACTUATED
-from explorer.prototype.weights import bar_masses, moving_bodies
-from explorer.statics.weights import carry
+from explorer.motion.chains import ACTUATED
+from explorer.motion.masses import bar_masses, moving_bodies
+from explorer.motion.weights import carry
 
 OPTIMAL = PRESETS["paper-optimal"]
 THICK = msgspec.structs.replace(

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.mechanism.design import Design
+from explorer.motion.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
-from explorer.statics.weights import MovingBodies
 
 
 @dataclass(frozen=True)

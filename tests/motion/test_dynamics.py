@@ -27,11 +27,11 @@ from explorer import (
 from explorer.export.simulation import simulation_mjcf
 from explorer.mechanism.design import DOWN
 from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.motion.chains import ACTUATED, BODIES, LEGS, ON_GUIDE, Chains
+from explorer.motion.inverse_jacobian import forces_of
+from explorer.motion.masses import DENSITY, Mass, bar_masses, moving_bodies, with_payload
+from explorer.motion.weights import carry
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import ACTUATED, BODIES, LEGS, ON_GUIDE, Chains
-from explorer.prototype.weights import DENSITY, Mass, bar_masses, moving_bodies, with_payload
-from explorer.statics.forces import forces_of
-from explorer.statics.weights import carry
 
 DESIGNS = [msgspec.structs.replace(OPTIMAL, payload=Payload(0.5)), *map(random_design, range(9))]
 # States of each design, so fast that inertia counts as much as weight.

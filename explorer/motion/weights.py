@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.motion.inverse_jacobian import A3X, A3Y
 from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, along, column, cross3, dot3, norm3, times, vector
-from explorer.statics.forces import A3X, A3Y
 
 LARGEST_RATE = 1e20
 """Largest entry of a twist or an acceleration, far below what makes forces overflow."""
@@ -261,7 +261,7 @@ def carry(
 ) -> Carried:
     """Return the load of weights and inertia of bodies at rest or in a motion.
 
-    The twist and the acceleration are those of `explorer.statics.motion.joint_accelerations`, of b4
+    The twist and the acceleration are those of `explorer.motion.rates.joint_accelerations`, of b4
     whatever the tool of the configuration. Where a leg lies along the first axis of its universal
     joint, its spin is undefined and taken as zero.
 

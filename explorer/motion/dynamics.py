@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
+from explorer.motion.inverse_jacobian import forces_of
+from explorer.motion.masses import DENSITY, bar_masses, moving_bodies
+from explorer.motion.weights import MovingBodies, carry
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.weights import DENSITY, bar_masses, moving_bodies
-from explorer.statics.forces import forces_of
-from explorer.statics.weights import MovingBodies, carry
 
 
 def inverse_dynamics(

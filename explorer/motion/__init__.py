@@ -1,0 +1,1 @@
+"""Motion: weights and inertia, rates of the joints, inverse dynamics, and J⁻¹ in closed form."""
