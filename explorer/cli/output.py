@@ -24,7 +24,7 @@ from explorer.mechanism.folds import FOLDS, to_folds
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_ascii, format_fixed
+from explorer.numerics.number_text import format_ascii
 
 
 def write_json(answer: Mapping[str, object]) -> None:
@@ -123,7 +123,7 @@ def figures(values: Iterable[float]) -> list[str]:
 
 def degrees(values: Iterable[float]) -> list[str]:
     """Return angles in degrees with three decimals each, never a negative zero."""
-    return [f"{format_fixed(value, 3)}°" for value in values]
+    return [f"{value:z.3f}°" for value in values]
 
 
 def heading(design: Design) -> str:

@@ -39,8 +39,6 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.checks import STIFFEST, size_problem
 from explorer.workspace.limits.valid_poses import COLLISIONS, colliding_pairs, sides_of_limits
 
-MOST_BYTES = 100_000_000
-"""Largest size of a table."""
 MOST_LINES = 100_000
 """Largest number of poses or joints in a table."""
 NO_POSE = "the lengths do not close"

@@ -21,6 +21,9 @@ from pathlib import Path
 
 from explorer.errors import StorageError
 
+LARGEST_FILE = 200_000_000
+"""Largest file that is read, in bytes; those that the explorer writes are much smaller."""
+
 # Remedy for each error of the system.
 _REMEDIES = {
     errno.ENOSPC: "make room on that disk, or write elsewhere",
@@ -80,7 +83,7 @@ def write_whole(path: Path, data: bytes) -> None:
                 scratch.unlink()
 
 
-def read_at_most(path: Path, largest: int) -> bytes:
+def read_at_most(path: Path, largest: int = LARGEST_FILE) -> bytes:
     """Return the contents of a plain file that has no more than a number of bytes.
 
     Raises:

@@ -2,7 +2,7 @@
 
 Whether a value is a rounding error follows from the size of the numbers from which it was
 computed: a design may have any unit, so no length is small in itself. Files and the command line
-have ASCII text, see `format_ascii` and `format_fixed`; pages and reports have `format_number`,
+have ASCII text, see `format_ascii`; pages and reports have `format_number`,
 `format_decimals`, `format_fitted` and `format_column`.
 
 The `size` of a number is the magnitude of those from which it was computed; 0 keeps every number.
@@ -116,11 +116,6 @@ def format_apart(
         if len({*texts}) == len({*values}):
             break
     return texts
-
-
-def format_fixed(value: float, decimals: int) -> str:
-    """Return a number with a fixed number of decimals; one that rounds to zero has no sign."""
-    return f"{value:z.{decimals}f}"
 
 
 def set_true_minus(text: str) -> str:

@@ -169,10 +169,6 @@ class Outcome:
         return self.run.evaluations
 
 
-# Largest record that is read, in bytes; real ones are much smaller.
-LARGEST_FILE = 200_000_000
-
-
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Settings of a search; see `optimise_design`."""
 
@@ -243,7 +239,7 @@ def load_record(path: Path) -> Record:
         InputError: The file holds no record.
         StorageError: The file cannot be read.
     """
-    return decode_record(read_at_most(path, LARGEST_FILE), str(path))
+    return decode_record(read_at_most(path), str(path))
 
 
 def compare_designs(

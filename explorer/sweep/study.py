@@ -41,8 +41,6 @@ NAMES = (*POLISHED, RADIUS, *MACHINE)
 """The variables of a study: those of X, the yaw of home in degrees, one maximum for all four
 lengths, one radius for all four legs, and those of the machine."""
 
-# Largest study that is read, in bytes; real ones are much smaller.
-LARGEST_FILE = 1_000_000
 # The longest Sobol sequence has as many points.
 MOST_DESIGNS = 2**30
 # A hypercube is made as a whole, in each process.
@@ -310,7 +308,7 @@ def load_study(path: str | Path) -> Study:
             f"no study and no file named {str(path)!r}; the studies that come along are "
             f"{', '.join(STUDIES)}"
         )
-    return decode_study(read_at_most(Path(path), LARGEST_FILE), str(path))
+    return decode_study(read_at_most(Path(path)), str(path))
 
 
 def study_hash(study: Study) -> str:

@@ -24,7 +24,6 @@ from explorer.numerics.number_text import (
     format_column,
     format_decimals,
     format_fitted,
-    format_fixed,
     format_number,
     snap_to_decimals,
 )
@@ -35,7 +34,6 @@ NEGATIVE_ZERO = re.compile(r"(?<![\d.])[-−]0(\.0*)?(?![\d.e])")
 @given(st.floats(-1e6, 1e6), st.floats(1e-20, 1e20), st.integers(1, 8))
 def test_number_text_of_zero_has_no_sign(value: float, size: float, digits: int) -> None:
     for text in (
-        format_fixed(value, digits),
         format_ascii(value, digits, size=size),
         format_decimals(value, digits),
         format_number(value, digits, size=size),

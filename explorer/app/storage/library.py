@@ -21,7 +21,7 @@ import msgspec
 from explorer.errors import InputError
 from explorer.files.writing import make_folder, move, read_at_most, write_whole
 from explorer.mechanism.design import Design
-from explorer.mechanism.design_file import LARGEST_FILE, decode_design, encode_design
+from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.numerics.checks import LONGEST_NAME, tidy_name
 from explorer.page.storage.folder import data_folder, make_data_folder, newest_first, plain_words
 
@@ -199,7 +199,7 @@ def _date(path: Path) -> None:
 def _read(path: Path) -> Entry:
     printable = "".join(c if c.isprintable() else "�" for c in path.name)
     try:
-        design = decode_design(read_at_most(path, LARGEST_FILE), repr(printable))
+        design = decode_design(read_at_most(path), repr(printable))
     except InputError as error:
         return Entry(printable, path.name, None, str(error))
     return Entry(design.name, path.name, design)

@@ -43,8 +43,6 @@ SCHEMA = 3
 # Largest number of steps in a file.
 MOST_STEPS = 50
 REFERENCE = "#"
-# Size in bytes beyond which no explorer wrote the file.
-LARGEST_FILE = 50_000_000
 
 Index = Annotated[int, msgspec.Meta(ge=0)]
 
@@ -107,7 +105,7 @@ class SessionFile:
         try:
             lock = try_lock(path)
             if lock is not None:
-                history = decode_session(read_at_most(path, LARGEST_FILE), repr(str(path)))
+                history = decode_session(read_at_most(path), repr(str(path)))
                 self.path, self._lock = path, lock
                 return history
         except StorageError as error:

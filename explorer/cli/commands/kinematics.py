@@ -100,7 +100,7 @@ def _files(option: str, table: Path | None, out: Path | None) -> tuple[Path, Pat
 
 
 def _read_table(path: Path, design: Design) -> pose_tables.Table:
-    data = read_at_most(path, pose_tables.MOST_BYTES)
+    data = read_at_most(path)
     return pose_tables.parse_table(str(path), data, design.unit_mm)
 
 

@@ -13,7 +13,7 @@ import tyro
 
 from explorer.cli import options, output, values
 from explorer.errors import InputError
-from explorer.export.pose_tables import MOST_BYTES, parse_table, read_poses
+from explorer.export.pose_tables import parse_table, read_poses
 from explorer.export.tables import corners_csv, drives_csv, trajectory_csv
 from explorer.files.writing import check_writable, read_at_most
 from explorer.legs.moves import StraightMoves
@@ -259,7 +259,7 @@ class Drives(TimedOptions):
             return start, goal
         if goal is not None or start != design.home_pose:
             raise InputError("--path has the ends: leave out --from, --to and their orientations")
-        table = parse_table(str(self.path), read_at_most(self.path, MOST_BYTES), design.unit_mm)
+        table = parse_table(str(self.path), read_at_most(self.path), design.unit_mm)
         if "time" in table.columns:
             raise InputError(
                 f"{self.path} has a column time, so it is a path in time already: give the "

@@ -125,7 +125,7 @@ def parts_table(parts: Parts, density: float) -> str:
             escape(line.name),
             f"{line.count}",
             f'<span class="ex-whole">{"Ø " * (len(line.stock) == 2)}'
-            f"{' × '.join(map(_mm, line.stock))}</span>",
+            f"{' × '.join(format_decimals(side, 1) for side in line.stock)}</span>",
             _grams(line.mass(density)),
         )
         for line in parts.lines
@@ -137,10 +137,6 @@ def parts_table(parts: Parts, density: float) -> str:
         caption(f"all parts; without the base {_mass(moving)}"),
         table(rows, ("part", "count", "stock, mm", "mass, g")),
     )
-
-
-def _mm(value: float) -> str:
-    return format_decimals(value, 1)
 
 
 def _grams(value: float) -> str:

@@ -16,7 +16,7 @@ from explorer.errors import InputError
 from explorer.files.writing import read_at_most, write_whole
 from explorer.page.storage.folder import make_data_folder, plain_words
 from explorer.sweep.parts import BadPartError, part_paths, read_part
-from explorer.sweep.study import LARGEST_FILE, Study, decode_study, encode_study
+from explorer.sweep.study import Study, decode_study, encode_study
 
 STUDIES_FOLDER = "studies"
 """Name of the folder of studies in the user's data folder."""
@@ -129,7 +129,7 @@ def study_in(folder: Path) -> Study:
         except BadPartError:
             continue
     file = _file_beside(folder)
-    return decode_study(read_at_most(file, LARGEST_FILE), str(file))
+    return decode_study(read_at_most(file), str(file))
 
 
 def _file_beside(folder: Path) -> Path:
