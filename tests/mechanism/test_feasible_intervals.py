@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 from refusals import refusal
-from strategies import Case, cases, designs, ordinary_cases, ordinary_designs, singular_cases
+from strategies import (
+    Case,
+    amplification,
+    cases,
+    designs,
+    ordinary_cases,
+    ordinary_designs,
+    singular_cases,
+)
 
 from explorer import JOINTS, PRESETS, Design, forward, inverse
 from explorer.mechanism.design import LENGTHS, Limits
@@ -75,10 +83,27 @@ def test_intervals_of_joints_that_do_not_close_are_where_samples_close(
     check_by_samples(design, joints, joint, size)
 
 
-@given(ordinary_cases())
-def test_intervals_are_disjoint_and_end_at_singular_joints_or_a_length_of_zero(case: Case) -> None:
-    assume(case.regularity > 1e-2)
+@given(cases(designs(nearness=(1.0, 1e-3))))
+def test_joints_of_a_regular_pose_lie_in_their_intervals_and_are_their_nearest(case: Case) -> None:
+    assume(case.regularity > 1e-3)
     for joint, intervals in enumerate(feasible_intervals(case.design, case.joints)):
+        assert inside(intervals, case.joints[joint : joint + 1], 1e-9 * case.size).all()
+        value = nearest_feasible(case.design, case.joints, joint, intervals)
+        if amplification(case) < 1e3 and case.regularity > 1e-2:
+            assert value == pytest.approx(case.joints[joint], rel=0, abs=1e-12 * case.size)
+
+
+@given(ordinary_cases(), st.sampled_from([1e-7, 1e-3, 1e3, 1e4]))
+def test_intervals_are_disjoint_end_at_singular_joints_or_zero_and_scale_with_the_design(
+    case: Case, scale: float
+) -> None:
+    assume(case.regularity > 1e-2)
+    larger = feasible_intervals(case.scaled(scale).design, case.joints * scale)
+    for joint, intervals in enumerate(feasible_intervals(case.design, case.joints)):
+        # At a double root an interval may be divided, so only the outer ends are compared.
+        outer = np.array([larger[joint][0][0], larger[joint][-1][1]]) / scale
+        ends_here = [intervals[0][0], intervals[-1][1]]
+        np.testing.assert_allclose(outer, ends_here, rtol=0, atol=1e-6 * case.size)
         ends = [end for interval in intervals for end in interval]
         assert len(ends) >= 2
         assert ends == sorted(ends)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from reference import read_reference
 from refusals import refusal
 from strategies import (
     EPSILON,
+    QUARTER_TURNS,
     Case,
     all_cases,
     amplification,
@@ -111,11 +114,68 @@ def test_forward_of_inverse_is_the_pose_in_the_mode_of_its_sign_triple(case: Cas
     moved = squared_margin_error(case) / case.size / case.regularity
     turned = moved / case.size / case.regularity
     assume(turned < 0.01)
+    if amplification(case) < 1e3 and case.regularity > 1e-2:
+        moved, turned = min(moved, 1e-10 * case.size), min(turned, 1e-10)
     solved = forward(case.design, case.joints)
     mode = int(mode_of(case.margins))
     assert solved.feasible
     assert_allclose(solved.position[mode], case.position, rtol=0, atol=moved)
     assert_allclose(solved.rotation[mode], case.rotation, rtol=0, atol=turned)
+
+
+def trilaterate(centres: FloatArray, radii: tuple[float, float, float], side: int) -> FloatArray:
+    """Return the point at distances from three centres (3, 3), on one side of their plane."""
+    edges, normal = centres[1:] - centres[0], np.cross(*(centres[1:] - centres[0]))
+    squares = np.square(radii)
+    along = 0.5 * (squares[0] - squares[1:] + (edges**2).sum(axis=1))
+    foot = np.linalg.solve(edges @ edges.T, along) @ edges
+    height = math.sqrt(max(0.0, squares[0] - foot @ foot))
+    return centres[0] + foot + side * height * normal / np.linalg.norm(normal)
+
+
+def modes_of_the_twin(
+    design: Design, joints: FloatArray, a2x: float
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield the eight poses by three trilaterations of the 6-4 twin, as in the paper's Figure 1."""
+    l1, d1, d2, d3, d4, l4 = joints.tolist()
+    b1, b2, b3 = (*design.b1, 0.0), (design.b2, 0.0, 0.0), (design.b3, 0.0, 0.0)
+    (a3x, a3y), b4 = design.a3, np.zeros(3)
+    for one, two, three in itertools.product((1, -1), repeat=3):
+        a1 = trilaterate(np.array([b1, b2, b3]), (l1, math.hypot(d1, d2), math.hypot(d3, d4)), one)
+        to_a2 = abs(a2x), math.hypot(d1 - a2x, d2), math.hypot(d3 - a2x, d4)
+        a2 = trilaterate(np.array([a1, b2, b3]), to_a2, two)
+        to_a3 = l4, math.hypot(a3x, a3y), math.hypot(a3x - a2x, a3y)
+        a3 = trilaterate(np.array([b4, a1, a2]), to_a3, three)
+        x = (a2 - a1) / a2x
+        y = (a3 - a1 - a3x * x) / a3y
+        rotation = np.array([x, y, np.cross(x, y)])
+        yield -rotation @ a1, rotation
+
+
+@given(ordinary_cases(), st.sampled_from([7.0, 23.0, 0.9, 11.0, 13.0, -17.0]))
+def test_modes_equal_those_of_the_6_4_twin_for_any_a2(case: Case, a2x: float) -> None:
+    assume(case.regularity > 2e-2)
+    solved, seen = forward(case.design, case.joints), set[int]()
+    for position, rotation in modes_of_the_twin(case.design, case.joints, a2x):
+        mode = int(mode_of(margins(position, rotation)))
+        seen.add(mode)
+        assert_allclose(solved.position[mode], position, rtol=0, atol=1e-7 * case.size)
+        assert_allclose(solved.rotation[mode], rotation, rtol=0, atol=1e-7)
+    assert seen == {*range(8)}
+
+
+@given(ordinary_cases(), st.sampled_from([1e-7, 1e-3, 1e3, 1e4]))
+def test_forward_in_another_unit_scales_positions_and_keeps_rotations(
+    case: Case, scale: float
+) -> None:
+    assume(case.regularity > 1e-2)
+    larger, joints = case.scaled(scale).design, case.joints
+    one, other = forward(case.design, joints), forward(larger, joints * scale)
+    assert other.feasible
+    assert_allclose(other.position / scale, one.position, rtol=0, atol=1e-9 * case.size)
+    assert_allclose(other.rotation, one.rotation, rtol=0, atol=1e-9)
+    squares = discriminants(larger, joints * scale) / scale**2
+    assert_allclose(squares, discriminants(case.design, joints), atol=1e-12 * case.size**2)
 
 
 @given(all_cases())
@@ -252,6 +312,16 @@ def test_joints_that_do_not_close_give_finite_rigid_poses(
     assert not solved.feasible[-1]
     check_finite_and_rigid(solved)
     assert np.isfinite(discriminants(case.design, rows)).all()
+
+
+@given(st.sampled_from([*QUARTER_TURNS]), st.integers(40, 110))
+def test_tilted_platforms_near_the_guide_give_rigid_poses(turn: FloatArray, exponent: int) -> None:
+    design = PRESETS["paper-optimal"]
+    near_guide = np.array([3.0, 3.0 * 10.0**-exponent, -4.0 * 10.0**-exponent])
+    tilted = turn @ rotation_from_quaternion([0.8, 0.3, -0.2, 0.5])
+    solved = forward(design, inverse(design, near_guide, tilted))
+    assert solved.feasible
+    check_finite_and_rigid(solved)
 
 
 @pytest.mark.parametrize(

@@ -71,6 +71,11 @@ def test_singular_poses_stay_singular_at_every_tool_and_have_finite_axes(
         assert np.isfinite(ellipsoid.axes).all()
         assert (ellipsoid.gain >= 0.0).all()
         assert np.isfinite(ellipsoid.force).all()
+    ball = singularity_free_ball(case.pose)
+    assert np.isfinite(ball.touches).all()
+    assert ball.radius >= 0.0
+    if np.hypot(case.rotation[1, 0], case.rotation[2, 0]) == 0.0:
+        assert ball.radius == 0.0
 
 
 def test_infinite_axis_is_a_motion_at_zero_actuator_speed() -> None:

@@ -16,6 +16,7 @@ from strategies import (
     QUARTER_TURNS,
     Case,
     all_cases,
+    cases,
     designs,
     ordinary_cases,
     positions,
@@ -221,6 +222,15 @@ def test_nearest_pose_in_a_closure_lies_in_it_and_no_nearer_than_in_the_closures
         assert found.distance == pytest.approx(way(case, case.pose, found.pose), abs=1e-12)
         for lower in COVERED[w]:
             assert nearest[lower].distance >= found.distance - 1e-9 * case.size
+
+
+@given(cases())
+@settings(max_examples=FEW)
+def test_nearest_poses_of_designs_of_any_size_are_finite_and_in_the_closures(case: Case) -> None:
+    for w, found in nearest_in_strata(case.design, case.pose).items():
+        assert np.isfinite(found.distance)
+        place = np.array(found.pose.position) / case.design.reach
+        assert_allclose(vanishing(w, place, found.pose.rotation), 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(

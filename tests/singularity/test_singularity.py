@@ -24,7 +24,7 @@ from strategies import (
 
 from explorer import PRESETS, Design, evaluate, inverse, jacobian, margins, rotation_from_quaternion
 from explorer.mechanism.kinematics import determinant, tetrahedron_volumes
-from explorer.mechanism.margins import TETRAHEDRA, planes_of_singularity
+from explorer.mechanism.margins import TETRAHEDRA, mode_of, planes_of_singularity, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
@@ -169,6 +169,21 @@ def test_margins_are_the_incidence_distances(case: Case) -> None:
     assume(math.hypot(case.rotation[1, 0], case.rotation[2, 0]) > 1e-3)
     margin, expected = np.abs(case.margins), incidence_distances(case)
     assert_allclose(margin, expected, rtol=1e-8, atol=1e-10 * case.size)
+
+
+@given(all_cases())
+def test_snapshot_of_any_pose_equals_its_parts(case: Case) -> None:
+    snapshot, p, r = evaluate(case.design, case.pose), case.position, case.pose.rotation
+    joints, margin = inverse(case.design, p, r), margins(p, r)
+    assert_array_equal(snapshot.joints, joints)
+    assert_array_equal(snapshot.margins, margin)
+    assert_array_equal(snapshot.volumes, tetrahedron_volumes(case.design, margin))
+    assert snapshot.mode == int(mode_of(margin))
+    assert snapshot.signs == signs_of(snapshot.mode)
+    assert snapshot.proximity == np.abs(margin).min() / case.design.reach
+    assert snapshot.determinant == float(determinant(case.design, joints, margin))
+    assert snapshot.modes.joints.shape == (8, 6)
+    assert snapshot.stratum_dimension in range(7)
 
 
 @given(all_cases() | collapsed_cases())
