@@ -22,6 +22,7 @@ from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design,
 from explorer.measures.measure import Case
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_ascii
 from explorer.optimise.problem import SHIFTS, ObjectiveName, Problem
 
 Status = Literal["converged", "not converged", "infeasible", "stalled", "outdone", "cancelled"]
@@ -85,7 +86,6 @@ class RunSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         evaluations: Number of designs that were measured.
         attempts: Number of attempts, from the start and from elsewhere.
         holding: Demand or bound that holds the best iterate, "" if none does.
-        message: Result in one line.
     """
 
     start: tuple[float, ...]
@@ -94,18 +94,36 @@ class RunSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     evaluations: int
     attempts: int
     holding: str
-    message: str
 
 
 class Run(RunSummary, frozen=True, kw_only=True):
-    """The search from one start, with its best iterate."""
+    """The search from one start, with its best iterate.
 
+    The reason says in one line why it found no optimum, "" where its status says all.
+    """
+
+    reason: str
     best: Iterate
+
+    def words(self, reached: str) -> str:
+        """Return the result in one line, given the objective that was reached, with its name."""
+        end = f"{reached} after {self.iterations} iterations"
+        held = f"{end}, held by {self.holding}" if self.holding else end
+        told: dict[Status, str] = {
+            "converged": f"converged: {held}",
+            "infeasible": f"no design was found that meets all demands: {held}",
+            "not converged": f"not converged: {held}; allow more iterations or start elsewhere",
+            "stalled": f"stalled: {held}; try several starts",
+            "outdone": f"no better than an earlier start, even without the clearance: {end}",
+            "cancelled": f"cancelled: {end}",
+        }
+        return self.reason or told[self.status]
 
 
 class RunRecord(RunSummary, frozen=True, kw_only=True):
-    """A run in a file, with the index of its best iterate in the history."""
+    """A run in a file, with its result in one line and its best iterate's index in the history."""
 
+    message: str
     best: int
 
 
@@ -140,10 +158,17 @@ class Outcome:
 
     @property
     def message(self) -> str:
-        """Result in one line, with the demand that the best so far of a cancelled search misses."""
+        """Result in one line, in design units."""
+        return self.words(reached_text(self.problem, self.best))
+
+    def words(self, reached: str) -> str:
+        """Return the result in one line, given the objective that was reached, with its name.
+
+        It has the demand that the best so far of a cancelled search misses.
+        """
+        words, last, best = self.run.words(reached), len(self.runs), self.chosen + 1
         if self.status != "cancelled":
-            return self.run.message
-        words, last, best = self.run.message, len(self.runs), self.chosen + 1
+            return words
         if best < last:
             words = f"cancelled in start {last}; the best so far is of start {best}, {words}"
         return words + (f"; missed: {self.best.worst}" if self.best.spare < 0.0 else "")
@@ -203,15 +228,31 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     versions: dict[str, str]
 
 
+def reached_text(problem: Problem, best: Iterate) -> str:
+    """Return the name of the objective, and its value in design units to six digits."""
+    # F compares numbers of unit size.
+    size = 1.0 if problem.objective == "match-volume" else 0.0
+    value = "infinite" if best.objective is None else format_ascii(best.objective, 6, size=size)
+    return f"{OBJECTIVE_SYMBOLS[problem.objective]} = {value}"
+
+
 def record_of(outcome: Outcome, settings: Settings) -> Record:
     """Return the record of an optimisation that was run with these settings."""
-    runs = [msgspec.structs.asdict(run) | {"best": run.best.number} for run in outcome.runs]
+    problem, shared = outcome.problem, RunSummary.__struct_fields__
+    runs = [
+        RunRecord(
+            **{name: getattr(run, name) for name in shared},
+            message=run.words(reached_text(problem, run.best)),
+            best=run.best.number,
+        )
+        for run in outcome.runs
+    ]
     return Record(
-        problem=outcome.problem,
+        problem=problem,
         settings=settings,
         design=outcome.design,
         chosen=outcome.chosen,
-        runs=msgspec.convert(runs, tuple[RunRecord, ...]),
+        runs=tuple(runs),
         history=msgspec.convert(outcome.history, tuple[IterateRecord, ...], from_attributes=True),
         seconds=outcome.seconds,
         versions=versions(),

@@ -270,7 +270,7 @@ def _measure(study: Study, sample: dict[str, float], row: dict[str, Value]) -> N
         }
         if not outcome.converged:
             # A message begins with how the search ended, which the status may say already.
-            status, reason = "not converged", outcome.run.message.removeprefix("not converged: ")
+            status, reason = "not converged", outcome.message.removeprefix("not converged: ")
     design = design_of(study, values)
     case = Case(design, study.nodes, study.clearance_margin)
     if case.volume.volume <= 0.0 and status == "done":

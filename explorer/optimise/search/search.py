@@ -24,8 +24,8 @@ import msgspec
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_apart, format_ascii, format_number
-from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Iterate, Phase, Run, Status
+from explorer.numerics.number_text import format_apart, format_number
+from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import OVER_BOX, Problem
 from explorer.optimise.search.demands import MET
 from explorer.optimise.search.model import Evaluation, Model, reported_objective
@@ -57,11 +57,11 @@ SAME = 1e-6
 
 
 class Attempt(NamedTuple):
-    """The result of one attempt."""
+    """The result of one attempt, and why it found no optimum if the status does not say it."""
 
     status: Status
     holding: str
-    message: str
+    reason: str
     best: Iterate
 
 
@@ -93,7 +93,7 @@ class Search:
                     break
         chosen = min(attempts, key=lambda a: (a.status != "converged", self.trail.rank(a.best)))
         if self.trail.is_cancelled:
-            chosen = chosen._replace(status="cancelled", holding="", message="")
+            chosen = chosen._replace(status="cancelled", holding="", reason="")
         return Run(
             start=self.start,
             status=chosen.status,
@@ -102,7 +102,7 @@ class Search:
             evaluations=self.evaluations,
             attempts=len(attempts),
             holding=chosen.holding,
-            message=self._message(chosen),
+            reason=self._reason(chosen),
         )
 
     def _attempts(self) -> Iterator[Attempt]:
@@ -115,7 +115,7 @@ class Search:
         for values in itertools.islice(places, ATTEMPTS - 1):
             yield self._attempt(values)
 
-    def _message(self, chosen: Attempt) -> str:
+    def _reason(self, chosen: Attempt) -> str:
         demanded, largest = self.problem.demands.volume or 0.0, self.largest_volume
         if chosen.status == "infeasible" and 0.0 < largest < demanded:
             asked, found = format_apart((demanded, largest), 6, format_number)
@@ -123,7 +123,7 @@ class Search:
                 f"no design within the bounds was found with a volume of {asked}; the largest "
                 f"found is {found}"
             )
-        return chosen.message or _default_message(self.problem, chosen, self.steps)
+        return chosen.reason
 
     def _attempt(self, values: Sequence[float], *, is_relaxed: bool = False) -> Attempt:
         """Search from some values; if it is relaxed, the clearance is only looked at in the end."""
@@ -323,23 +323,3 @@ def _missed_words(proof: Proof) -> str:
         return f"not converged: {proof.name} is not kept everywhere, such as at {place}"
     words = f"not converged: {proof.name} is kept wherever it was computed, but not proven"
     return f"{words} at {place}" if np.isfinite(proof.position).all() else f"{words} everywhere"
-
-
-def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
-    """Return the message of a run."""
-    name = OBJECTIVE_SYMBOLS[problem.objective]
-    # F compares numbers of unit size.
-    size = 1.0 if problem.objective == "match-volume" else 0.0
-    objective = attempt.best.objective
-    value = "infinite" if objective is None else format_ascii(objective, 6, size=size)
-    end = f"{name} = {value} after {steps} iterations"
-    held = f", held by {attempt.holding}" if attempt.holding else ""
-    messages: dict[Status, str] = {
-        "converged": f"converged: {end}{held}",
-        "infeasible": f"no design was found that meets all demands: {end}{held}",
-        "not converged": f"not converged: {end}{held}; allow more iterations or start elsewhere",
-        "stalled": f"stalled: {end}{held}; try several starts",
-        "outdone": f"no better than an earlier start, even without the clearance: {end}",
-        "cancelled": f"cancelled: {end}",
-    }
-    return messages[attempt.status]

@@ -12,7 +12,7 @@ import time
 
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import Advance, CancelRun, Compare, EndRun
-from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
+from explorer.app.features.optimise.state import REACHED, Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import optimise
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.state.actions import Action
@@ -171,7 +171,7 @@ def result_of(run: SearchRun, ending: Outcome | str, iterates: tuple[Iterate, ..
     if isinstance(ending, Outcome):
         return SearchResult(
             status=ending.status,
-            message=ending.message,
+            message=ending.words(REACHED),
             best=ending.best,
             starts=len(ending.runs),
             converged=sum(tried.status == "converged" for tried in ending.runs),

@@ -90,13 +90,17 @@ class OptimisationRequest:
         return self.with_box or any(demands) or self.objective in problems.OVER_BOX
 
 
+REACHED = "{objective}"
+"""The place of the objective in the message of a search, which is shown in the unit of the page."""
+
+
 @dataclass(frozen=True)
 class SearchResult:
     """How a run ended.
 
     Attributes:
         status: That of the outcome; "failed" if there is none.
-        message: One line for people.
+        message: One line for people, in which `REACHED` stands for the objective with its name.
         best: The best iterate; None if there is none.
         starts: Number of starts that were tried.
         converged: Number of starts that converged.

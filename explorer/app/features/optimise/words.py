@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -10,7 +9,7 @@ from html import escape
 from explorer.app.features.compare.table import Column, measure_row
 from explorer.app.features.optimise import buttons, work
 from explorer.app.features.optimise.actions import LiftLimit
-from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
+from explorer.app.features.optimise.state import REACHED, Optimisation, SearchResult, SearchRun
 from explorer.app.state.state import State
 from explorer.app.state.view import View
 from explorer.app.widgets import markup
@@ -187,9 +186,7 @@ def verdict_words(state: State, run: SearchRun, verdict: SearchResult) -> str:
     title = "Cancelled" if verdict.best is None else TITLES[verdict.status]
     message = verdict.message.removeprefix(f"{verdict.status}: ")
     if verdict.best is not None:
-        # The search tells its objective in design units.
-        value = rf"{OBJECTIVE_SYMBOLS[run.problem.objective]} = \S+"
-        message = re.sub(value, _reached_text(run.problem, verdict.best, state), message)
+        message = message.replace(REACHED, _reached_text(run.problem, verdict.best, state))
     remarks: list[str] = []
     if verdict.starts > 1:
         remarks.append(f"{verdict.starts} starts, {verdict.converged} converged")
