@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 from limited_designs import limited, ordinary_case
 from long_cases import long_after
 from machines import FULL, OPTIMAL, PRECISE, same_for_all
 from random_searches import positions_of_box
+from scipy.optimize import linprog
 
-from explorer import Actuators, Design, InputError
+from explorer import Actuators, Design, InputError, actuator_forces
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Swing
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.motion.weights import MovingBodies, payload_wrench
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.numerics.cells import CellValues, largest_values
 from explorer.optimise.problem import Box
 from explorer.proofs.limits import prove_limits
 from explorer.proofs.proof import Proof
-from explorer.proofs.statics import prove_deflection, prove_error, prove_load
+from explorer.proofs.statics import (
+    _cell_forces,  # pyright: ignore[reportPrivateUsage]
+    prove_deflection,
+    prove_error,
+    prove_load,
+)
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, largest_deflection, stiffness_of
 from explorer.statics.reactions import largest_accelerations, limit_shares, part_limits, reactions
+from explorer.workspace.clearance_bounds import least_in_workspace
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid, violations
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
@@ -211,6 +221,64 @@ def test_statics_are_proven_exactly_where_the_largest_of_all_positions_allows(
             worst = max(moved, key=lambda proof: proof.missed)
             least = largest_of_kinds(design, worst.position[None])[1]
             assert least < acceleration / factor
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_forces_over_a_cell_are_within_their_bounds_and_so_are_their_differences(seed: int) -> None:
+    design, box = machine(seed)
+    rotation, rng, reach = design.home_pose.rotation, np.random.default_rng(seed), design.reach
+    middles = positions_of_box(box, 60, rng)
+    half = 10.0 ** rng.uniform(-3.0, -1.5, (60, 3)) * reach
+    found = _cell_forces(design, rotation, middles, half)
+    tool, centre = design.tool.position, design.payload.centre
+    weight = design.payload.weight_n * np.array(design.gravity)
+
+    def forces(point: Triple, loads: FloatArray, p: FloatArray) -> FloatArray:
+        """Return the forces (..., 6) of the actuators under each of the loads at a point."""
+        wrenches = np.hstack([loads, np.zeros((len(loads), 3))])
+        return np.stack(
+            [actuator_forces(design, p, rotation, wrench, point) for wrench in wrenches]
+        )
+
+    step = 1e-4 * reach
+    for bounds, point, loads in (
+        (found.at_tool, tool, np.eye(3)),
+        (found.at_payload, centre, np.eye(3)),
+        (found.by_weight, centre, weight[None]),
+    ):
+        assert np.isfinite(bounds.size).all()
+        for _ in range(8):
+            p = middles + half * rng.uniform(-1.0, 1.0, middles.shape)
+            here = forces(point, loads, p)
+            assert (lengths_of(np.moveaxis(here, 0, -1)) <= bounds.size[:, 0] * (1.0 + 1e-9)).all()
+            for axis, way in enumerate(step * np.eye(3)):
+                ahead, behind = forces(point, loads, p + way), forces(point, loads, p - way)
+                first = lengths_of(np.moveaxis(ahead - behind, 0, -1)) / (2.0 * step)
+                second = lengths_of(np.moveaxis(ahead - 2.0 * here + behind, 0, -1)) / step**2
+                noise = 1e-6 * bounds.size[:, 0] / reach
+                assert (first <= bounds.first[:, axis] * (1.0 + 1e-3) + noise).all()
+                assert (second <= bounds.second[:, axis] * (1.0 + 1e-2) + 1e-2 * noise).all()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 4))
+def test_bound_by_duality_is_below_the_least_value_of_a_linear_programme(
+    seed: int, count: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    value, slope, half = rng.normal(), rng.normal(size=3), rng.uniform(0.1, 2.0, 3)
+    slack, slopes = rng.normal(size=count) + 0.5, rng.normal(size=(count, 3))
+    slopes[rng.random((count, 3)) < 0.2] = 0.0
+    x, y, z = slope.tolist()
+    bound = least_in_workspace(value, (x, y, z), half, slack, slopes)
+    assert bound >= value - np.abs(slope) @ half - 1e-12
+    # The slacks are not negative in the workspace.
+    limits: dict[str, Any] = {"A_ub": -slopes, "b_ub": slack} if count else {}
+    solve: Any = linprog
+    least = solve(slope, **limits, bounds=np.stack([-half, half], axis=-1))
+    if least.status == 0:
+        assert bound <= value + least.fun + 1e-9
+        if count <= 1:
+            assert bound == pytest.approx(value + least.fun, abs=1e-9)
 
 
 def test_parts_without_a_limit_have_nothing_to_prove() -> None:
