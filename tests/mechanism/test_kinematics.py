@@ -125,14 +125,12 @@ def test_forward_of_inverse_is_the_pose_in_the_mode_of_its_sign_triple(case: Cas
 
 def trilaterate(centres: FloatArray, radii: tuple[float, float, float], side: int) -> FloatArray:
     """Return the point at distances from three centres (3, 3), on one side of their plane."""
-    edges, normal = (
-        centres[1:] - centres[0],
-        np.cross(centres[1] - centres[0], centres[2] - centres[0]),
-    )
-    squares = np.array(radii) ** 2
+    edges: FloatArray = centres[1:] - centres[0]
+    normal = np.cross(edges[0], edges[1])
+    squares: FloatArray = np.array(radii) ** 2
     along: FloatArray = 0.5 * (squares[0] - squares[1:] + (edges**2).sum(axis=1))
-    foot: FloatArray = np.linalg.solve(edges @ edges.T, along) @ edges
-    height = math.sqrt(max(0.0, float(squares[0] - (foot**2).sum())))
+    foot = np.asarray(np.linalg.solve(edges @ edges.T, along) @ edges, dtype=np.float64)
+    height = math.sqrt(max(0.0, float(squares[0] - foot @ foot)))
     return centres[0] + foot + side * height * normal / float(np.linalg.norm(normal))
 
 
