@@ -9,6 +9,7 @@ from http import HTTPStatus
 from http.client import HTTPConnection, HTTPResponse
 
 import pytest
+from client import websocket_status
 from hypothesis import given, strategies as st
 from websockets.datastructures import Headers
 from websockets.http11 import Request
@@ -38,6 +39,11 @@ EVIL_ORIGINS = (
     f"chrome-extension://127.0.0.1:{PORT}", f"127.0.0.1:{PORT}", f"http:// 127.0.0.1:{PORT}",
 )  # fmt: skip
 
+NAMES = HERE, f"localhost:{PORT}", f"[::1]:{PORT}"
+WORDS = st.text(st.characters(codec="latin-1", exclude_categories=["Cc"]), max_size=30) | (
+    st.from_regex(r"(https?://)?[a-z0-9.:\[\]-]{1,30}", fullmatch=True)
+)
+
 
 def request(target: str, **headers: list[str]) -> Request:
     return Request(target, Headers((name, each) for name in headers for each in headers[name]))
@@ -61,20 +67,36 @@ def is_forbidden(refusal: Refusal | None) -> bool:
     return refusal is not None and refusal[0] == HTTPStatus.FORBIDDEN
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]", "LOCALHOST"])
-def test_loopback_name_passes_without_a_token(host: str) -> None:
-    name = f"{host}:{PORT}"
+def check_on_loopback(host: str, origin: str) -> None:
+    """Check that only a name of this machine and its own origin pass, others with a line."""
+    is_here = host.lower() in NAMES
+    is_own = origin.lower() in (f"http://{host}".lower(), f"https://{host}".lower())
+    for head, passes in (
+        (page(host), is_here),
+        # Even with the cookie, which a browser may send along.
+        (websocket(host, origin, cookie=COOKIE), is_here and is_own),
+    ):
+        refusal = OPEN.judge(head, PORT)
+        assert passes if refusal is None else is_forbidden(refusal) and not passes
+        assert refusal is None or refusal[1].isprintable()
+
+
+def test_only_names_of_this_machine_and_their_own_origins_pass_on_loopback() -> None:
     assert OPEN.token is None
-    assert OPEN.judge(page(name), PORT) is None
-    for scheme in ("http", "https"):
-        assert OPEN.judge(websocket(name, f"{scheme}://{name}"), PORT) is None
-    assert OPEN.judge(websocket(host, f"http://{host}"), 80) is None
+    for host in (*NAMES, f"LOCALHOST:{PORT}", *EVIL_HOSTS):
+        for origin in (f"http://{host}", f"https://{host}", *EVIL_ORIGINS):
+            check_on_loopback(host, origin)
+            if host == HERE and origin in EVIL_ORIGINS:
+                head = websocket(origin=origin, cookie=COOKIE)
+                assert is_forbidden(CLOSED.judge(head, PORT))
+    for host in ("127.0.0.1", "localhost", "[::1]"):
+        assert OPEN.judge(websocket(host, f"http://{host}"), 80) is None
 
 
-@pytest.mark.parametrize("host", EVIL_HOSTS)
-def test_other_host_is_refused_on_loopback(host: str) -> None:
-    assert is_forbidden(OPEN.judge(page(host), PORT))
-    assert is_forbidden(OPEN.judge(websocket(host, f"http://{host}"), PORT))
+@given(WORDS, WORDS)
+def test_no_other_host_and_no_other_origin_passes_on_loopback(host: str, origin: str) -> None:
+    check_on_loopback(host, origin)
+    check_on_loopback(HERE, origin)
 
 
 @pytest.mark.parametrize("hosts", [[], [HERE, HERE], [HERE, "evil.example"]])
@@ -83,24 +105,6 @@ def test_request_without_exactly_one_host_and_origin_is_refused(hosts: list[str]
     for access in (OPEN, CLOSED):
         for headers in ({"host": hosts}, {"host": [HERE], "origin": origins, "upgrade": ["x"]}):
             assert is_forbidden(access.judge(request("/", cookie=[COOKIE], **headers), PORT))
-
-
-@pytest.mark.parametrize("access", [OPEN, CLOSED])
-@pytest.mark.parametrize("origin", EVIL_ORIGINS)
-def test_websocket_of_another_origin_is_refused(access: Access, origin: str) -> None:
-    # Even with the cookie, which a browser may send along.
-    assert is_forbidden(access.judge(websocket(origin=origin, cookie=COOKIE), PORT))
-
-
-@given(
-    st.text(st.characters(codec="latin-1", exclude_categories=["Cc"]), max_size=30)
-    | st.from_regex(r"https?://[a-z0-9.:\[\]-]{1,30}", fullmatch=True)
-)
-def test_only_the_origin_of_the_host_passes_and_others_get_a_printable_line(origin: str) -> None:
-    refusal = OPEN.judge(websocket(origin=origin), PORT)
-    assert (refusal is None) == (origin.lower() in (f"http://{HERE}", f"https://{HERE}"))
-    for each in (refusal, OPEN.judge(page(origin), PORT)):
-        assert each is None or each[1].isprintable()
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "lab.example", "fe80::1"])
@@ -301,6 +305,12 @@ def test_page_through_a_proxy_lets_itself_connect_there(behind: Running) -> None
     response, page = get(behind, "/", **BROWSER)
     assert response.status == 401
     assert "?token=" in page
+    bare = behind.url.partition("/?")[0]
+    assert [websocket_status(url) for url in (bare, f"{behind.url}x", behind.url)] == [
+        401,
+        401,
+        101,
+    ]
     assert "<script" not in get(behind, "/", Host="<script>alert(1)</script>", **BROWSER)[1]
 
 

@@ -25,6 +25,7 @@ from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest, SearchResult
 from explorer.app.features.paths.actions import Go, Play
 from explorer.app.features.studies.state import Studies
+from explorer.app.features.view.feature import FORMS
 from explorer.app.inputs.controls import MAIN
 from explorer.app.server import Running
 from explorer.app.session.session import UNDO, Session
@@ -69,6 +70,16 @@ def test_press_of_a_client_is_one_step(running: Running, tab: SocketTab) -> None
         session.do(UNDO)
     assert session.wait_until_idle()
     assert session.state.compared.is_empty
+
+
+def test_form_of_the_mechanism_is_chosen_by_a_press_and_given_up_by_another(
+    running: Running, tab: SocketTab
+) -> None:
+    session = running.page.session
+    # A press on the form that is drawn goes back to the schematic.
+    for form, drawn in [*((form, form) for form in FORMS), ("6-4 twin", "schematic")]:
+        tab.update(*press_update(running, "view.form", form))
+        wait_for(lambda drawn=drawn: session.state.view.drawn_as == drawn)
 
 
 @pytest.mark.parametrize("extra", EXTRAS)

@@ -15,6 +15,7 @@ from client import Client, client_of, press_update, presses_in, wait_for
 from services import StubWorker
 
 from explorer.app.features.designs.feature import UNSAVED
+from explorer.app.features.sharing.feature import send_picture
 from explorer.app.server import Running, start
 from explorer.app.session.session import move_to
 from explorer.app.state.actions import SetPosition
@@ -101,6 +102,20 @@ def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Pat
         with client_of(running) as other:
             running.page.services.tell("the next study has ended")
             assert len(notices_until(other, "the next study has ended")) == 1
+
+
+def test_picture_of_an_impossible_size_is_refused_to_the_tab_that_asks_alone(
+    tmp_path: Path,
+) -> None:
+    with (
+        explorer_with(data_in(tmp_path)) as running,
+        client_of(running) as client,
+        client_of(running) as other,
+    ):
+        send_picture(running.page.services, (9, 100), client.client_id)
+        refused = notices_until(client, "got 9")[-1]["body"]
+        assert "the width of a picture is 16 to 4,096 pixels; got 9" in refused
+        assert "got 9" not in str(other.read_all_sent(running))
 
 
 def encoded(what: str) -> bytes:

@@ -80,8 +80,3 @@ def test_session_of_a_killed_explorer_is_resumed_by_the_next_one_alone(tmp_path:
     with serve(tmp_path) as second:
         assert "Going on with 'paper-optimal'" in second.said
         assert second.value("x") == 122.5
-        # Another one at the same time begins anew, and takes nothing away.
-        with serve(tmp_path) as third:
-            assert "Going on" not in third.said
-            assert third.value("x") == 100.0
-        assert second.value("x") == 122.5

@@ -14,7 +14,6 @@ from compiled_kernel import COMPILER, SANITIZED, CompiledKernel, compile_c
 from exported_designs import in_mm, limited_design, poses_about_home, random_poses, size_of
 from long_cases import long_after
 from numpy.testing import assert_allclose, assert_array_equal
-from reference import read_reference
 
 from explorer import PRESETS, Design, forward, from_folds, inverse, jacobian, margins, to_folds
 from explorer.export.controller import LIMIT_NAMES, kernel_files
@@ -101,20 +100,6 @@ def test_kernel_tells_the_broken_limits(tmp_path: Path) -> None:
         assert_array_equal(broken == 0, poses_are_valid(design, *poses))
         met |= np.bitwise_or.reduce(broken)
     assert met == (1 << len(LIMIT_NAMES)) - 1
-
-
-def test_reference_cases_have_their_joints_margins_and_folds(tmp_path: Path) -> None:
-    for index, case in enumerate(read_reference("kinematics")["cases"][:8]):
-        (folder := tmp_path / str(index)).mkdir()
-        design = Design(**case["design"], unit_mm=1.0)
-        kernel, size = CompiledKernel(design, folder), size_of(design)
-        pose = np.array([case["position"]]), np.array([case["rotation"]])
-        assert_allclose(kernel.inverse(*pose)[0], case["joints"], rtol=0, atol=SHARE * size)
-        margin, mode = kernel.margins(*pose)
-        assert_allclose(margin[0], case["margins"], rtol=0, atol=SHARE * size)
-        positions, rotations, _ = kernel.forward(np.array([case["joints"]]))
-        assert_allclose(positions[0, mode[0]], case["position"], rtol=0, atol=1e-9 * size)
-        assert_allclose(rotations[0, mode[0]], case["rotation"], rtol=0, atol=1e-9)
 
 
 def test_kernel_of_degenerate_input_is_defined(tmp_path: Path) -> None:

@@ -10,11 +10,13 @@ import time
 from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 from html import unescape
+from http import HTTPStatus
 from typing import Any, Protocol
 
 import msgspec
 import viser
 import zstandard
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
@@ -63,6 +65,15 @@ def opened(
         max_size=None,
         proxy=None,
     )
+
+
+def websocket_status(url: str, **headers: str | None) -> int:
+    """Return the status with which a websocket is refused; 101 if it is let in."""
+    try:
+        opened(url, **headers).close()
+    except InvalidStatus as refusal:
+        return refusal.response.status_code
+    return HTTPStatus.SWITCHING_PROTOCOLS
 
 
 def wait_for(condition: Callable[[], object], seconds: float = PATIENCE_SECONDS) -> None:
