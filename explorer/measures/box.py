@@ -9,7 +9,6 @@ all of them are infinite.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -95,23 +94,29 @@ def box_margins(box: tuple[Triple, Triple], rotation: FloatArray) -> FloatArray:
     return np.where(least > SINGULAR * lengths_of(corners).max(), least, 0.0)
 
 
-@dataclass(frozen=True)
-class BoxStatics:
-    """A design under its payload over a box, at one orientation.
+class BoxStatics(Configuration):
+    """A design under its payload at nodes of a box, at one orientation, with its tool point.
 
     A box whose lows are its highs is one position.
 
-    Attributes:
+    Args:
         design: The manipulator.
         box: Lows and highs of the positions, in design units.
         rotation: Platform to base, shape (3, 3).
         places: Further positions to evaluate, as shares of the box's edges, shape (k, 3).
     """
 
-    design: Design
-    box: tuple[Triple, Triple]
-    rotation: FloatArray
-    places: ArrayLike = ()
+    def __init__(
+        self,
+        design: Design,
+        box: tuple[Triple, Triple],
+        rotation: FloatArray,
+        places: ArrayLike = (),
+    ) -> None:
+        self.box, (lows, highs) = box, np.array(box)
+        further = lows + (highs - lows) * np.reshape(places, (-1, 3))
+        nodes = np.vstack([box_nodes(box), further])
+        super().__init__(design, nodes, rotation, design.tool.position)
 
     @cached_property
     def is_regular(self) -> bool:
@@ -119,31 +124,19 @@ class BoxStatics:
         return bool(box_margins(self.box, self.rotation).all())
 
     @cached_property
-    def positions(self) -> FloatArray:
-        """Nodes of the grid and the further positions, shape (n, 3)."""
-        lows, highs = np.array(self.box)
-        further = lows + (highs - lows) * np.reshape(self.places, (-1, 3))
-        return np.vstack([box_nodes(self.box), further])
-
-    @cached_property
-    def configuration(self) -> Configuration:
-        """The design at the nodes of the grid, with its tool point."""
-        return Configuration(self.design, self.positions, self.rotation, self.design.tool.position)
-
-    @cached_property
     def reactions(self) -> Reactions:
         """The reactions to the weight of the payload."""
-        return reactions(self.configuration, np.zeros(6), MovingBodies().with_payload(self.design))
+        return reactions(self, np.zeros(6), MovingBodies().with_payload(self.design))
 
     @cached_property
     def errors(self) -> ToolError:
         """The worst errors of the tool at the nodes, each of shape (n,)."""
-        return worst_errors(self.configuration, actuator_errors(self.design))
+        return worst_errors(self, actuator_errors(self.design))
 
     @cached_property
     def compliances(self) -> FloatArray:
         """The compliance at the nodes, shape (n, 6, 6)."""
-        return compliance.compliance_of(self.configuration, *compliance.stiffness_of(self.design))
+        return compliance.compliance_of(self, *compliance.stiffness_of(self.design))
 
     @cached_property
     def softest(self) -> FloatArray:
@@ -174,7 +167,7 @@ class BoxStatics:
     @cached_property
     def accelerations(self) -> FloatArray:
         """The largest accelerations by each part at the nodes, shape (n, 10), in m/s²."""
-        return largest_accelerations(self.configuration)
+        return largest_accelerations(self)
 
     def worst(self, values: FloatArray) -> float:
         """Return the largest of values at the nodes; infinite if the box has singular positions."""

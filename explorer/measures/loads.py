@@ -92,9 +92,7 @@ def _loads_at(*, is_home: bool) -> Iterator[Measure]:
         "largest_payload",
         "largest payload",
         "The largest mass in place of the payload that keeps all limits",
-        lambda statics: (
-            float(largest_payload(statics.configuration).min()) if statics.is_regular else 0.0
-        ),
+        lambda statics: float(largest_payload(statics).min()) if statics.is_regular else 0.0,
         ("is_limited",),
         unit="kg",
         sense="more",

@@ -24,6 +24,12 @@ from explorer.numerics.arrays import FloatArray
 
 Value = TypeVar("Value")
 
+WITHOUT_TOOL = (
+    *("points", "legs", "leg_lengths", "leg_directions", "joints", "margins"),
+    *("variables", "positions", "rotations"),
+)
+"""The properties of a `Configuration` that do not depend on its tool."""
+
 
 class Configuration:
     """A design in one pose or in a batch of poses, with a tool point; all are attributes too.
@@ -52,10 +58,10 @@ class Configuration:
         self.tool = np.zeros(3) if tool is None else arrays.position_array("tool", tool)
         self.batch = self.batch_with()
 
-    @classmethod
-    def at(cls, design: Design, pose: Pose, tool: ArrayLike | None = None) -> Configuration:
+    @staticmethod
+    def at(design: Design, pose: Pose, tool: ArrayLike | None = None) -> Configuration:
         """Return the configuration of a design in one pose."""
-        return cls(design, pose.position, pose.rotation, tool)
+        return Configuration(design, pose.position, pose.rotation, tool)
 
     def batch_with(self, *values: FloatArray) -> tuple[int, ...]:
         """Return the batch axes that poses and vectors (..., k) share."""
@@ -74,10 +80,20 @@ class Configuration:
         return spread
 
     def with_tool(self, tool: ArrayLike) -> Configuration:
-        """Return the configuration with another tool point in the platform frame."""
+        """Return the configuration with another tool point in the platform frame.
+
+        It keeps what is known of legs, joints and margins, which have no tool.
+        """
         if np.array_equal(self.tool, tool):
             return self
-        return Configuration(self.design, self.position, self.rotation, tool)
+        moved = object.__new__(Configuration)
+        moved.design, moved.position, moved.rotation = self.design, self.position, self.rotation
+        moved.tool = arrays.position_array("tool", tool)
+        moved.batch = moved.batch_with()
+        if moved.batch == self.batch:
+            known = {name: self.__dict__[name] for name in WITHOUT_TOOL if name in self.__dict__}
+            moved.__dict__.update(known)
+        return moved
 
     @cached_property
     def points(self) -> AttachmentPoints:

@@ -44,11 +44,10 @@ class WorstForce(NamedTuple):
     share: float
 
 
-@dataclass(frozen=True)
-class LoadedPose:
+class LoadedPose(Configuration):
     """A design in one pose, under a load at the tool point, its payload and other weights.
 
-    Attributes:
+    Args:
         design: The manipulator, with its tool, payload and limits.
         pose: The pose.
         load: (F; M) at the tool point, base axes, in N and N × unit.
@@ -58,22 +57,23 @@ class LoadedPose:
             units; None for the tool.
     """
 
-    design: Design
-    pose: Pose
-    load: Six = NO_LOAD
-    own: MovingBodies | None = None
-    weighs_payload: bool = True
-    point: Triple | None = None
+    def __init__(
+        self,
+        design: Design,
+        pose: Pose,
+        load: Six = NO_LOAD,
+        own: MovingBodies | None = None,
+        weighs_payload: bool = True,
+        point: Triple | None = None,
+    ) -> None:
+        self.point = design.tool.position if point is None else point
+        super().__init__(design, pose.position, pose.rotation, self.point)
+        self.pose, self.load, self.own, self.weighs_payload = pose, load, own, weighs_payload
 
-    @property
-    def tool(self) -> Triple:
-        """The point at which the load acts, in the platform frame and design units."""
-        return self.design.tool.position if self.point is None else self.point
-
-    @cached_property
-    def configuration(self) -> Configuration:
-        """The design in the pose, with the point at which the load acts."""
-        return Configuration.at(self.design, self.pose, self.tool)
+    def with_load(self, load: Six) -> LoadedPose:
+        """Return the pose under another load."""
+        rest = self.own, self.weighs_payload, self.point
+        return LoadedPose(self.design, self.pose, load, *rest)
 
     @cached_property
     def weights(self) -> MovingBodies:
@@ -84,12 +84,12 @@ class LoadedPose:
     @cached_property
     def carried(self) -> Carried:
         """What all weights do."""
-        return carry(self.configuration, self.weights)
+        return carry(self, self.weights)
 
     @cached_property
     def reactions(self) -> Reactions:
         """The reactions to the load and the weights."""
-        return reactions(self.configuration, self.load, self.carried)
+        return reactions(self, self.load, self.carried)
 
     @cached_property
     def shares(self) -> FloatArray:
@@ -108,10 +108,9 @@ class LoadedPose:
         No forces hold such a load. Any other load is held in a singular pose, too, but by no unique
         forces: those that balance each other can be added.
         """
-        at_b4 = Configuration.at(self.design, self.pose)
-        twists, reach = free_twists(at_b4), self.design.reach
+        twists, reach = free_twists(self.with_tool(np.zeros(3))), self.design.reach
         velocities, turning = reach * twists[:, :3], twists[:, 3:]
-        at_tool = velocities + np.cross(turning, self.pose.rotation @ np.array(self.tool))
+        at_tool = velocities + np.cross(turning, self.pose.rotation @ self.tool)
         force, moment = np.split(self.carried.wrench + self.load, 2)
         work = np.abs(at_tool @ force + turning @ moment)
         size = reach * np.linalg.norm(force) + np.linalg.norm(moment)
@@ -132,7 +131,7 @@ class LoadedPose:
     @cached_property
     def largest_payload(self) -> float:
         """The largest mass in place of the payload that keeps all limits, in kg."""
-        return float(largest_payload(self.configuration, self.load, self.own))
+        return float(largest_payload(self, self.load, self.own))
 
     @cached_property
     def unit_force(self) -> WorstForce:
@@ -142,7 +141,7 @@ class LoadedPose:
         direction is 1 / share.
         """
         bare = msgspec.structs.replace(self.design, payload=Payload())
-        return LoadedPose(bare, self.pose, point=self.tool).worst_force(1.0)
+        return LoadedPose(bare, self.pose, point=self.point).worst_force(1.0)
 
     def worst_force(self, force: float) -> WorstForce:
         """Return the direction of an added force at the tool, in N, that uses the largest share.
@@ -151,7 +150,7 @@ class LoadedPose:
         with one component of the force only: that along the row of an actuator in J⁻ᵀ. So the
         largest share is that of one of these six directions or of their opposites.
         """
-        rows = twists_of_actuators(self.configuration)[:3].T
+        rows = twists_of_actuators(self)[:3].T
         if not np.isfinite(rows).all():
             return WorstForce(np.full(3, np.nan), self.worst, np.inf)
         if not has_limits(self.design):
@@ -161,7 +160,7 @@ class LoadedPose:
         directions = np.concatenate([units, -units])
         loads = np.tile(self.load, (len(directions), 1))
         loads[:, :3] += force * directions
-        shares = limit_shares(self.design, reactions(self.configuration, loads, self.carried))
+        shares = limit_shares(self.design, reactions(self, loads, self.carried))
         row, part = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
         share = float(shares[row, part])
         direction = directions[row] if share > 0.0 else np.full(3, np.nan)
@@ -203,7 +202,7 @@ class ToolPrecision:
     def compliance(self) -> FloatArray:
         """The compliance at the tool, shape (6, 6)."""
         stiffness = elasticity.stiffness_of(self.loaded.design)
-        return elasticity.compliance_of(self.loaded.configuration, *stiffness)
+        return elasticity.compliance_of(self.loaded, *stiffness)
 
     @cached_property
     def is_regular(self) -> bool:
@@ -223,7 +222,7 @@ class ToolPrecision:
     @cached_property
     def by_source(self) -> FloatArray:
         """The tool's error per error of each source, shape (6, 29)."""
-        return accuracy.error_by_source(self.loaded.configuration)
+        return accuracy.error_by_source(self.loaded)
 
     def worst(self, sources: slice = BY_ALL) -> accuracy.LargestError:
         """Return the largest errors by some of the sources."""
@@ -264,7 +263,7 @@ class ToolPrecision:
     def shares(self) -> elasticity.ComplianceShares:
         """Shares of guide, struts and actuators in the deflection's work."""
         stiffness = elasticity.stiffness_of(self.loaded.design)
-        return elasticity.compliance_shares(self.loaded.configuration, self.wrench, *stiffness)
+        return elasticity.compliance_shares(self.loaded, self.wrench, *stiffness)
 
     @cached_property
     def largest_displacement(self) -> float:
@@ -275,5 +274,5 @@ class ToolPrecision:
     @cached_property
     def carriages(self) -> FloatArray:
         """Displacements of the carriages along the guide, shape (2,), in a regular pose."""
-        by_guide = twists_of_actuators(self.loaded.configuration)[:, GUIDE_ROWS]
+        by_guide = twists_of_actuators(self.loaded)[:, GUIDE_ROWS]
         return by_guide.T @ self.wrench / elasticity.stiffness_of(self.loaded.design)[0][GUIDE_ROWS]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refusal
 from strategies import Case, ordinary_cases
 
@@ -25,7 +25,7 @@ from explorer import (
     stratum,
 )
 from explorer.measures.snapshot import PoseIndices
-from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.configuration import WITHOUT_TOOL, Configuration
 from explorer.mechanism.kinematics import determinant, tetrahedron_volumes
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.nearest import nearest_singular_poses
@@ -96,6 +96,23 @@ def test_pose_functions_in_another_unit_scale_by_their_power(case: Case, factor:
         value = function.value(other.design, other.position, other.rotation)
         scaled, atol = value / factor**function.power, 1e-9 * case.size**function.power
         assert_allclose(scaled, expected, rtol=1e-9, atol=atol, err_msg=function.name)
+
+
+@given(ordinary_cases())
+def test_another_tool_keeps_what_is_known_of_the_legs_and_changes_the_rest(
+    case: Case,
+) -> None:
+    at, tool = case.at, case.position[::-1]
+    known = {name: getattr(at, name) for name in WITHOUT_TOOL}
+    assert np.isfinite(at.singular_values).all()
+    other, anew = at.with_tool(tool), Configuration(case.design, case.position, case.rotation, tool)
+    for name, value in known.items():
+        assert getattr(other, name) is value
+        assert_array_equal(np.vstack(value), np.vstack(getattr(anew, name)))
+    for name in ("arm", "joint_arms", "jacobian", "singular_values", "tools"):
+        assert_array_equal(getattr(other, name), getattr(anew, name))
+    many = at.with_tool(np.tile(tool, (3, 1)))
+    assert many.margins.shape == (3, 3)
 
 
 @each_function

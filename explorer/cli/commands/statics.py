@@ -22,6 +22,7 @@ from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import DIMENSIONS, Six
 from explorer.mechanism.margins import INCIDENCES, SINGULAR, margins
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.motion.masses import bar_masses, moving_bodies
 from explorer.motion.weights import MovingBodies
 from explorer.prototype.assembly import make_prototype
@@ -85,16 +86,15 @@ class Forces(LoadOptions):
             raise InputError("--parts needs the density of the parts: add --density KG_PER_M3")
         design = self.read_loaded_design()
         pose, tool = self.pose(design), self.tool(design)
-        configuration = Configuration.at(design, pose, tool)
         weights = self._own_weights(design)
         found = loaded.LoadedPose(design, pose, self.load, weights, point=tool or B4)
-        if not np.isfinite(forces.twists_of_actuators(configuration)).all():
+        if not np.isfinite(twists_of_actuators(found)).all():
             raise singular_error(pose, f"the {blocks.in_singular_pose(found)}")
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most
         nearest = None
         if found.share > 1.0:
             nearest = nearest_carrying_pose(found)
-        worst = forces.worst_direction(configuration, most)
+        worst = forces.worst_direction(found, most)
         added = None if self.force is None else found.worst_force(self.force)
         self.write(
             lambda: {
@@ -218,7 +218,7 @@ def _accuracy_json(found: loaded.ToolPrecision) -> dict[str, object]:
         "displacement_by_actuator": alone.displacement[loaded.BY_ACTUATORS],
         "turn_by_actuator": alone.turn[loaded.BY_ACTUATORS],
         "dimensions": list(DIMENSIONS),
-        "pose_error_by_geometry": accuracy.error_by_geometry(found.loaded.configuration),
+        "pose_error_by_geometry": accuracy.error_by_geometry(found.loaded),
         "displacement_by_geometry": alone.displacement[loaded.BY_DIMENSIONS],
         "turn_by_geometry": alone.turn[loaded.BY_DIMENSIONS],
     }

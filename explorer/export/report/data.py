@@ -6,7 +6,7 @@ A value that cannot be computed does not stop the report: the reason stands in i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
@@ -124,7 +124,7 @@ class ReportData(Case):
         _, worst = largest_deflection(weighed.compliance, weighed.wrench, force)
         if not np.isfinite(worst).all():
             return weighed
-        return ToolPrecision(replace(weighed.loaded, load=(*triple(worst), 0.0, 0.0, 0.0)))
+        return ToolPrecision(weighed.loaded.with_load((*triple(worst), 0.0, 0.0, 0.0)))
 
     @cached_property
     def bill(self) -> Bill | ExplorerError:

@@ -75,7 +75,7 @@ def load_source(topic: LoadTopic, loaded: LoadedPose, density: float | None = No
     design, pose = loaded.design, loaded.pose
     imports = ["import explorer", "from explorer.statics.loaded import LoadedPose"]
     lines = [*_design_and_pose(design, pose)]
-    options, arguments, remark = pose_options(design, pose, loaded.tool), ["design", "pose"], ""
+    options, arguments, remark = pose_options(design, pose, loaded.point), ["design", "pose"], ""
     if any(loaded.load):
         options += f" --load {_words(loaded.load)}"
         arguments.append(f"load={tuple(map(float, loaded.load))}")

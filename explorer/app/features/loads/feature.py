@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import get_args
 
 import msgspec
@@ -181,7 +180,7 @@ def assume_limits(state: State) -> Action | None:
 
 def without_force(loaded: LoadedPose) -> LoadedPose:
     """Return the pose under its moment and weights, without the force at the tool."""
-    return replace(loaded, load=(0.0, 0.0, 0.0, *loaded.load[3:]))
+    return loaded.with_load((0.0, 0.0, 0.0, *loaded.load[3:]))
 
 
 def load_figure(services: Services) -> BarPart:
