@@ -51,7 +51,6 @@ from explorer.legs.interference import step_overlaps, swept_tetrahedra
 from explorer.legs.moves import move_clearance
 from explorer.measures.blocks.clearances import DIGITS, pose_clearances
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -59,7 +58,6 @@ from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, TUBE
 from explorer.workspace.accessible.nodes import StartError, check_start
 from explorer.workspace.accessible.radii import RadiusCurve
-from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
 
@@ -141,20 +139,6 @@ THICK = show(thick(open_state(OPTIMAL), RADIUS))
 
 
 # The accessible workspace
-
-
-def test_drawing_has_the_numbers_of_the_library() -> None:
-    drawing = drawing_of(THICK)
-    expected = accessible_workspace(THICK.design, tolerance=work.PART_TOLERANCE * OPTIMAL.reach)
-    assert drawing.part is not None
-    assert drawing.trouble is None
-    assert drawing.volume == expected.volume
-    assert drawing.part.volume == expected.accessible_volume
-    assert drawing.part.node_count == expected.accessible_node_count
-    assert drawing.part.pairs == expected.pairs
-    assert drawing.nodes is not None
-    assert drawing.nodes.count == expected.node_count
-    assert drawing.mesh_volume == pytest.approx(expected.accessible_volume, rel=1e-3)
 
 
 def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
@@ -283,24 +267,6 @@ def summary(state: State) -> str:
     """Return all that the panel says of the drawing of a state."""
     frame, feed = Frame(state), follow(state, WORKSPACE_FEED)[0]
     return drawing_words(frame, feed) + workspace_details(frame, feed)
-
-
-def test_numbers_of_the_panel_are_those_of_the_library() -> None:
-    drawing, html = drawing_of(THICK), summary(THICK)
-    accessible = drawing.part
-    assert accessible is not None
-    volume, percent = accessible.volume, 100.0 * accessible.volume / drawing.volume
-    for text in (
-        f"{format_number(volume, 6)} cm³ accessible, {format_number(percent, 4)} %",
-        f"{accessible.node_count} of 999",
-        "Legs 1–4, 2–4, 3–4 collide",
-    ):
-        assert text in html
-    rows = [row for row in rows_of(html) if len(row) == 3]
-    assert [row[0] for row in rows] == [f"{i}–{j}" for i, j in PAIRS]
-    for (_, clearance, blocked), pair in zip(rows, accessible.pairs, strict=True):
-        assert number(clearance) == pytest.approx(OPTIMAL.unit_mm * pair.clearance, rel=5e-3)
-        assert number(blocked) == pytest.approx(pair.blocked_volume, abs=0.06)
 
 
 def test_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
@@ -461,7 +427,6 @@ def test_chart_appears_once_its_curve_is_computed(services: Services, worker: St
     assert "computing" not in radius_words(Frame(narrow), feed)
 
 
-JOINED = Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
 END = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
 
 
@@ -510,14 +475,6 @@ def test_table_shows_the_clearance_of_each_pair() -> None:
         assert ["ex-beyond" in line for line in lines] == (expected < 0.0).tolist()
         assert f"Least clearance: legs {rows[int(expected.argmin())][0]}," in html
     assert verdicts == {True, False}
-
-
-def test_legs_that_share_a_joint_are_called_joined() -> None:
-    index = PAIRS.index((2, 4))
-    html = render(pose_clearances(Frame(open_state(JOINED)).snapshot))
-    assert rows_of(html)[index] == ["2–4", "joined"]
-    state = swept(open_state(JOINED))
-    assert rows_of(move_table(Frame(state)))[index] == ["2–4", "", "joined", ""]
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3, 0.4])

@@ -28,7 +28,7 @@ from explorer.app.features.workspace.slice_map import map_picture
 from explorer.app.features.workspace.words import drawing_words, volume_headline, volume_text
 from explorer.app.features.workspace.work import STEP, Selection, WorkspaceDrawing, export_mesh
 from explorer.app.scene.surfaces import AT_LIMIT, PLAIN
-from explorer.app.state.actions import Open, Set, SetAngle, SetPosition, SetVariable
+from explorer.app.state.actions import Open, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView
@@ -82,17 +82,6 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
         assert f"{format_number(expected.volume)} cm³" in words
         assert "units" not in words
         assert "±" in words
-
-
-def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
-    services, state = services_for(), SetAngle(1, 20.0).apply(open_state(OPTIMAL))
-    for orientation, words in (("pose", "present"), ("home", "home")):
-        chosen = with_workspace(state, orientation=orientation)
-        follow(services, chosen)
-        feed = services.get(feeds.VOLUME_FEED)
-        expected = workspace_volume(OPTIMAL, feeds.workspace_pose(Frame(chosen)).rotation).volume
-        assert volume_text(feed.drawing, UNITS) == f"{format_number(expected)} units³"
-        assert f"in the {words} orientation" in volume_headline(Frame(chosen), feed)
 
 
 def test_volume_is_requested_before_the_drawing_and_once_only() -> None:
