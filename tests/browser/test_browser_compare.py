@@ -11,6 +11,7 @@ from server_clock import wait_until_drawn
 from tab import Tab
 
 from explorer.app.features.compare.feature import Pin
+from explorer.app.features.compare.state import Compared
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.state.actions import Set
 from explorer.app.state.view import View
@@ -39,9 +40,9 @@ def purple_pixels(tab: Tab) -> int:
 def test_designs_are_pinned_measured_overlaid_and_opened(tab: Tab) -> None:
     tab.running.page.session.do(Set("view", View(handle=False, tetrahedra=(False, False, False))))
     tab.turn_to("Compare")
-    press(tab, "Keep a copy as it is now", lambda: tab.state.compared.pinned[0] is not None)
+    press(tab, "Keep a copy as it is now", lambda: Compared.of(tab.state).pinned[0] is not None)
     pinned = tab.state.design
-    assert tab.state.compared.pinned == (pinned, None, None)
+    assert Compared.of(tab.state).pinned == (pinned, None, None)
     tab.turn_to("Design")
     tab.choose("Preset", "paper-initial")
     tab.wait_for(lambda: tab.state.design == PRESETS["paper-initial"], "the other preset")
@@ -53,13 +54,13 @@ def test_designs_are_pinned_measured_overlaid_and_opened(tab: Tab) -> None:
             timeout=1000 * PATIENCE_SECONDS
         )
     before = purple_pixels(tab)
-    press(tab, "Draw the workspaces over one another", lambda: tab.state.compared.look.overlay)
+    press(tab, "Draw the workspaces over one another", lambda: Compared.of(tab.state).look.overlay)
     assert wait_until_drawn(page, PATIENCE_SECONDS)
     assert purple_pixels(tab) > before + MANY
     press(tab, "Make paper-optimal the live design", lambda: tab.state.design == pinned)
     tab.page.get_by_role("button", name="Undo").click()
     tab.wait_for(lambda: tab.state.design == PRESETS["paper-initial"], "what was there before")
-    press(tab, "Unpin paper-optimal", lambda: tab.state.compared.is_empty)
+    press(tab, "Unpin paper-optimal", lambda: Compared.of(tab.state).is_empty)
     assert wait_until_drawn(page, PATIENCE_SECONDS)
     assert np.abs(purple_pixels(tab) - before) < MANY
 
@@ -75,7 +76,7 @@ def test_button_in_markup_that_is_pressed_by_a_key_keeps_the_focus(tab: Tab) -> 
         tab.page.keyboard.press("Tab")
     expect(bars).to_be_focused()
     tab.page.keyboard.press("Enter")
-    tab.wait_for(lambda: tab.state.compared.look.shows == "bars", "bars")
+    tab.wait_for(lambda: Compared.of(tab.state).look.shows == "bars", "bars")
     # The markup is another by then.
     expect(bars).to_have_attribute("aria-pressed", "true")
     expect(bars).to_be_focused()

@@ -203,7 +203,7 @@ def test_three_designs_are_compared_by_volume_and_overlay(newcomer: Newcomer) ->
 
 def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.MonkeyPatch) -> None:
     # So long that even a slow browser can stop it on the way.
-    monkeypatch.setattr("explorer.app.state.paths.STRAIGHT_SECONDS", 600.0)
+    monkeypatch.setattr("explorer.app.features.paths.state.STRAIGHT_SECONDS", 600.0)
     newcomer.open("Paths")
     newcomer.choose("Goal", "Mode 7: + + +")
     newcomer.press("Go")

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, rows_of
 from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
 from explorer.app.session.feed import Feed
-from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import without_name
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
@@ -129,7 +130,7 @@ FEEDS: tuple[Callable[[Services], CompareFeed], ...] = tuple(
 
 
 def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
-    state, compared = frame.state, frame.state.compared
+    state, compared = frame.state, Compared.of(frame.state)
     design = design_in(column, state)
     if compared.is_empty or design is None:
         return None
@@ -146,7 +147,7 @@ def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
 
 def design_in(column: int, state: State) -> Design | None:
     """Return the design of a column; None if nothing is pinned there."""
-    return (state.design, *state.compared.pinned)[column]
+    return (state.design, *Compared.of(state).pinned)[column]
 
 
 def drawing_in(column: int, feed: CompareFeed) -> ComparedDrawing | None:

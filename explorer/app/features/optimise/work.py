@@ -99,7 +99,7 @@ def _find_refusals(
 
 def liftable_limits(state: State) -> tuple[str, ...]:
     """Return the limits that prevent a search and can be lifted, one press for each."""
-    if state.optimisation.is_on:
+    if Optimisation.of(state).is_on:
         return ()
     limits = dict.fromkeys(refusal.limit for refusal in find_refusals(state))
     return tuple(

@@ -34,7 +34,7 @@ STROKES_HINT = (
 
 
 def _request_for(frame: Frame) -> Design | None:
-    return None if frame.state.optimisation.is_on else frame.state.design
+    return None if frame.state.busy else frame.state.design
 
 
 BuildFeed: TypeAlias = Feed[Design, Buildability]

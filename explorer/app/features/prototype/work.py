@@ -13,8 +13,8 @@ import numpy as np
 
 from explorer.app.scene.surfaces import Drawn, with_creases
 from explorer.app.session.feed import Feed, feed_of
-from explorer.app.state.compared import without_name
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import without_name
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
 from explorer.prototype.assembly import Prototype, bill_of_materials, make_prototype
