@@ -195,7 +195,7 @@ class BoxStatics(Configuration):
             return {}
         twists = slopes.twist_slopes(self.design, self.positions, self.rotation)
         parts = np.divmod(np.arange(10 * len(self.positions)), 10)
-        largest, by = slopes.share_slopes(self.design, self.rotation, twists, parts, limits)
+        largest, by = slopes.utilisation_slopes(self.design, self.rotation, twists, parts, limits)
         return _by_name(by[largest.argmax()])
 
     def acceleration_slopes(self) -> Mapping[str, float]:

@@ -544,7 +544,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     poses = task(*arguments).poses
     weights = weights_of_parts((PRESS, 3000.0)).with_payload(PRESS)
     along = path_loads(PRESS, poses, state.load, tool=state.tool, weights=weights)
-    assert 0.5 < along.share <= 1.0 + 1e-4
+    assert 0.5 < along.utilisation <= 1.0 + 1e-4
 
 
 def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
@@ -553,12 +553,12 @@ def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     found = LoadPlot(services).shares(Frame(state))
     assert found is not None
     expected = path_loads(PRESS, journey.poses, state.load, tool=journey.tool)
-    np.testing.assert_array_equal(found.path.shares, expected.shares)
+    np.testing.assert_array_equal(found.path.utilisations, expected.utilisations)
     timed = journey.trajectory
     np.testing.assert_allclose(np.interp(found.time, timed.time, timed.at), expected.at, atol=1e-9)
     pose = journey.pose_at(found.seconds)
     here = path_loads(PRESS, (pose, pose), state.load)
-    assert (here.share, here.part) == (pytest.approx(expected.share), expected.part)
+    assert (here.utilisation, here.part) == (pytest.approx(expected.utilisation), expected.part)
 
 
 # Speeds and forces along the path

@@ -131,7 +131,7 @@ class JourneyLoads(NamedTuple):
 
 def load_words(loads: JourneyLoads) -> str:
     """Return the largest share of a limit along a path, its bound and its place, as HTML."""
-    share, bound, part = loads.path.share, loads.path.bound, loads.path.part
+    share, bound, part = loads.path.utilisation, loads.path.bound, loads.path.part
     at = f"at {format_decimals(loads.seconds, 2)} s"
     hint = ""
     if part is None:
@@ -321,9 +321,9 @@ class LoadPlot:
             columns = blank_columns(2, (0.0, LEAST_TOP))
         else:
             # Room above the largest share and the limit, in percent.
-            top = float(np.clip(115.0 * loads.path.share, LEAST_TOP, MOST_TOP))
+            top = float(np.clip(115.0 * loads.path.utilisation, LEAST_TOP, MOST_TOP))
             # Far above the chart a line is as good as at infinity.
-            percent: FloatArray = np.minimum(100.0 * loads.path.shares.max(axis=1), 4.0 * top)
+            percent: FloatArray = np.minimum(100.0 * loads.path.utilisations.max(axis=1), 4.0 * top)
             share = np.append(percent, np.interp([journey.at] * 2, loads.time, percent))
             beyond = np.where(share > 100.0, share, np.nan)
             columns = time_columns(loads.time, (share, beyond), journey.at, (0.0, top))

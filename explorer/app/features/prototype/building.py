@@ -22,7 +22,7 @@ from explorer.mechanism.design import LENGTHS, Design
 from explorer.motion.chains import LEGS
 from explorer.numerics.number_text import format_decimals
 from explorer.prototype.fitting import Buildability, buildability
-from explorer.prototype.sizes import Stroke
+from explorer.prototype.sizes import StrokeRange
 
 MEND = "prototype.mend"
 FITTING, STROKES = "fitting", "strokes"
@@ -144,5 +144,5 @@ def strokes_table(built: Buildability) -> str:
     return table(rows, ("actuator", "stroke, mm", "limits, mm"))
 
 
-def _span(stroke: Stroke) -> str:
+def _span(stroke: StrokeRange) -> str:
     return " to ".join(format_decimals(end, 1) for end in stroke)
