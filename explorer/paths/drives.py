@@ -22,9 +22,9 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
 from explorer.mechanism.pose import Pose, Triple
-from explorer.motion.inverse_jacobian import forces_of
+from explorer.motion.dynamics import forces_in_motion
 from explorer.motion.masses import DENSITY, bar_masses, moving_bodies
-from explorer.motion.weights import MovingBodies, carry
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.shortest_time import SINGULAR, law_of_shortest_time
 from explorer.paths.time_law import Motion, TimeLaw, law_at_speed
@@ -119,7 +119,7 @@ class ActuatorMotion:
         twist, bend = moves.slopes(motion.number, c.rotation)
         rate, change = motion.rate[:, None], motion.change[:, None]
         acceleration = change * twist + rate**2 * bend
-        force = forces_of(c, carry(c, bodies, rate * twist, acceleration).wrench)
+        force = forces_in_motion(c, bodies, rate * twist, acceleration)
         if not np.isfinite(force).all():
             raise NoAnswerError(SINGULAR)
         return ActuatorMotion(

@@ -23,8 +23,8 @@ from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
-from explorer.motion.inverse_jacobian import forces_of
-from explorer.motion.weights import MovingBodies, carry
+from explorer.motion.dynamics import forces_in_motion
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_apart
 from explorer.paths.time_law import PLATFORM, LedIntervals, TimeLaw, Travel
@@ -62,7 +62,7 @@ class RateBounds(NamedTuple):
         c, rest = Configuration(design, *moves.poses(number, share)), np.zeros(6)
         twist, bend = moves.slopes(number, c.rotation)
         at_rest, with_u, with_x = (
-            forces_of(c, carry(c, bodies, *motion).wrench)
+            forces_in_motion(c, bodies, *motion)
             for motion in ((rest, rest), (rest, twist), (twist, bend))
         )
         if not np.isfinite(at_rest).all():

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.pose import Triple
 from explorer.motion.inverse_jacobian import forces_of, twists_of_actuators
@@ -91,6 +91,12 @@ def reactions(
     )
 
 
+@computed_once
+def payload_reactions(configuration: Configuration) -> Reactions:
+    """Return the reactions to the weight of a design's payload alone."""
+    return reactions(configuration, np.zeros(6), MovingBodies().with_payload(configuration.design))
+
+
 def limit_shares(design: Design, result: Reactions) -> FloatArray:
     """Return the utilisations of a design's limits by reactions, shape (..., 12), as in `LIMITED`.
 
@@ -115,7 +121,7 @@ def utilisations_in_motion(configuration: Configuration, acceleration: float = 0
     without turning, as for `largest_accelerations`.
     """
     payload = configuration.design.payload
-    held = reactions(configuration, np.zeros(6), MovingBodies().with_payload(configuration.design))
+    held = payload_reactions(configuration)
     if acceleration:
         effect = _effect(configuration, held.spread.shape[:-1], payload.centre)
         held = held._replace(spread=held.spread + acceleration * payload.mass_kg * effect)
@@ -204,7 +210,7 @@ def largest_accelerations(configuration: Configuration) -> FloatArray:
     is not held at rest, −∞ in a singular pose, and infinite for a part without a limit.
     """
     design = configuration.design
-    held = reactions(configuration, np.zeros(6), MovingBodies().with_payload(design))
+    held = payload_reactions(configuration)
     values = np.concatenate([held.actuators, held.bending, held.guide_force], axis=-1)
     regular = np.isfinite(values)
     values = np.where(regular, values, 0.0)
