@@ -1,7 +1,7 @@
 """The masses of bodies in closed form, and the weights that the forces of the actuators need.
 
-Bodies are closed meshes, or bars and balls in their place, which simulate a design that is too
-tight for its parts. Units are those of the lengths and the density given.
+Bars and balls stand in for the parts of a prototype, also of a design that is too tight for these.
+Units are those of the lengths and the density given.
 """
 
 from __future__ import annotations
@@ -9,10 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explorer.mechanism.design import Design
 from explorer.motion.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
@@ -60,18 +58,6 @@ def total_mass(parts: Iterable[Mass]) -> Mass:
         off = part.centre - centre
         inertia += part.inertia + part.mass * (off @ off * np.eye(3) - np.outer(off, off))
     return Mass(mass, centre, inertia)
-
-
-def mesh_mass(vertices: FloatArray, faces: NDArray[np.int32], density: float) -> Mass:
-    """Return the mass properties of the body that a closed mesh encloses, exactly.
-
-    The faces (m, 3) are counter-clockwise from outside.
-    """
-    import trimesh
-
-    untyped: Any = trimesh.triangles
-    found = untyped.mass_properties(vertices[faces], density=density)
-    return Mass(float(found["mass"]), found["center_mass"], found["inertia"])
 
 
 DENSITY = 1240.0

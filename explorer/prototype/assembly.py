@@ -58,14 +58,6 @@ class Prototype:
             for body in BODIES[1:]
         }
 
-    def at(self, position: ArrayLike, rotation: ArrayLike) -> tuple[FloatArray, ...]:
-        """Return the vertices of all parts in one pose, in the base frame and design units."""
-        places = self.places(position, rotation)
-        return tuple(
-            np.asarray(part.vertices @ turn.T + origin)
-            for part, origin, turn in zip(self.parts, places.origin, places.rotation, strict=True)
-        )
-
 
 def make_prototype(design: Design) -> Prototype:
     """Return the parts of a design, sized from it, its legs' radii and its unit.

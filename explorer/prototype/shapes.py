@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from explorer.errors import ExplorerError
 from explorer.mechanism.pose import Triple
 from explorer.motion.chains import BODIES, LEGS, ON_GUIDE
-from explorer.motion.masses import Mass, mesh_mass
+from explorer.motion.masses import Mass
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.sizes import CLEARANCE, LegSizes, Sizes
 from explorer.workspace.solids.solid import Solid
@@ -268,7 +268,11 @@ class PrototypePart:
     @cached_property
     def unit_mass(self) -> Mass:
         """The mass properties at a density of 1, in design units."""
-        return mesh_mass(self.vertices, self.faces, 1.0)
+        import trimesh
+
+        untyped: Any = trimesh.triangles
+        found = untyped.mass_properties(self.vertices[self.faces], density=1.0)
+        return Mass(float(found["mass"]), found["center_mass"], found["inertia"])
 
     def mass(self, density: float, unit_mm: float) -> Mass:
         """Return the mass properties in kilograms and metres, at a density in kg/m³."""

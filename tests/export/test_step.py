@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited, reference_case
+from part_gaps import placed
 
 from explorer import (
     PRESETS,
@@ -205,7 +206,8 @@ def test_step_assembly_reads_back_the_places_of_parts(tmp_path: Path) -> None:
     assert data.count(b"COLOUR_RGB") >= 7
     shape = read(path)
     home = OPTIMAL.home_pose
-    points = np.concatenate(prototype.at(home.position, home.rotation)) * OPTIMAL.unit_mm
+    places = prototype.places(home.position, home.rotation)
+    points = np.concatenate(placed(prototype.parts, places)[1]) * OPTIMAL.unit_mm
     box = occ("Bnd_Box")()
     occ("BRepBndLib").AddOptimal_s(shape, box, False, False)
     for corner, expected in (

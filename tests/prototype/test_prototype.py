@@ -113,10 +113,7 @@ def test_parts_of_turned_frames_are_those_of_the_same_mechanism(design: Design) 
     for one, two in zip(plain.parts, other.parts, strict=True):
         assert two.solid.volume == pytest.approx(one.solid.volume, rel=1e-6), one.name
     turn = {BELOW: HALF_TURN_X, UPSIDE_DOWN: np.eye(3), BACKWARDS: HALF_TURN_Z}[design]
-    one, two = (
-        np.array([[each.min(axis=0), each.max(axis=0)] for each in p.at(*pose_of(p))])
-        for p in (plain, other)
-    )
+    one, two = (np.array(placed(p.parts, p.places(*pose_of(p)))[1]) for p in (plain, other))
     np.testing.assert_allclose(np.sort(one @ turn.T, axis=1), np.sort(two, axis=1), atol=0.02)
 
 
