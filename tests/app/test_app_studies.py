@@ -17,8 +17,10 @@ import pytest
 from client import wait_for
 from desk import Desk
 from hypothesis import given, strategies as st
+from services import StubWorker
 
 from explorer.app.features.feature import Services
+from explorer.app.features.studies import work
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.feature import DECODER, PlotEvent, StudiesPanel
 from explorer.app.features.studies.feed import StudyDrawing, StudyFeed
@@ -71,7 +73,7 @@ from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.numerics.number_text import UNITS, Unit
 from explorer.page.browser.browser_facts import decode_text
 from explorer.sweep.machine import MACHINE
-from explorer.sweep.parts import part_paths, write_part
+from explorer.sweep.parts import claim, write_part
 from explorer.sweep.results import Results, load_results
 from explorer.sweep.rows import evaluate
 from explorer.sweep.study import NAMES, Objective, Sampling, Study, encode_study
@@ -570,7 +572,9 @@ def test_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -
     assert_designs(seen, "points", [0, 1, 2, 3], points_html(seen))
     # A line needs a place on each axis; a design without one is counted.
     assert_designs(seen, "lines", [0, 2], lines_html(seen))
-    assert "<b>2</b> without a line, which lack reach" in status_of(results, seen)
+    drawing = drawing_of(results, seen)
+    assert drawing.is_complete
+    assert "<b>2</b> without a line, which lack reach" in status(drawing)
     # As an axis it places no design that lacks it, picked or not.
     other = select_rows(results, UNITS, results.front(), replace(studies, up="reach", picked=1))
     assert other is not None
@@ -588,7 +592,7 @@ def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -
         assert seen.axes == ("b2", "volume")
         assert_designs(seen, "points", [0, 1, 2, 3], points_html(seen))
         assert_designs(seen, "lines", [0, 1, 2, 3], lines_html(seen))
-        assert "without a line" not in status_of(results, seen)
+        assert "without a line" not in status(drawing_of(results, seen))
     # Where no design has all axes, points are drawn and no line.
     columns |= {"volume": [4.0, 2.0, nan, nan], "reach": [nan, nan, 3.0, 1.0]}
     results = results_of(columns)
@@ -596,7 +600,9 @@ def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -
     assert seen is not None
     assert_designs(seen, "points", [2, 3], points_html(seen))
     assert seen.rows["lines"].tolist() == [] == designs_in(lines_html(seen))
-    assert "<b>4</b> without a line, which lack volume or reach" in status_of(results, seen)
+    assert "<b>4</b> without a line, which lack volume or reach" in status(
+        drawing_of(results, seen)
+    )
 
 
 @pytest.mark.parametrize(
@@ -620,11 +626,9 @@ def test_study_is_written_in_the_unit_of_lengths(lengths: Unit, volumes: Unit) -
     assert lengths.text(1.0) in words
 
 
-def status_of(results: Results, seen: PlotRows) -> str:
+def drawing_of(results: Results, seen: PlotRows) -> StudyDrawing:
     front = np.flatnonzero(seen.front)
-    return status(
-        StudyDrawing(seen.studies, results, UNITS, front, seen.inside, seen, ("", ""), ())
-    )
+    return StudyDrawing(seen.studies, results, UNITS, front, seen.inside, seen, ("", ""), ())
 
 
 class Studio:
@@ -645,10 +649,6 @@ def studio(desk: Desk, tmp_path: Path) -> Generator[Studio]:
     studio.feed.stop()
 
 
-def bytes_of(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in part_paths(folder)}
-
-
 def test_study_that_is_refused_or_lacks_a_library_leaves_no_entry(
     studio: Studio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -658,8 +658,11 @@ def test_study_that_is_refused_or_lacks_a_library_leaves_no_entry(
     monkeypatch.setattr(StudyFolders, "new", lambda *_: other)  # pyright: ignore
     other.mkdir(parents=True)
     (other / "notes.txt").write_text("mine")
+    runner.worker = worker = StubWorker()
     runner.start(OPTIMAL, QUICK)
-    assert runner.wait_until_idle(PATIENCE)
+    with pytest.raises(InputError) as refusal, claim(other, worker.orders[0].request):
+        pass
+    worker.orders[0].failed(str(refusal.value))
     assert "is not empty" in desk.complaints.pop()
     monkeypatch.setattr(extras, "is_missing", lambda *_: True)  # pyright: ignore
     runner.start(OPTIMAL, QUICK)
@@ -669,37 +672,62 @@ def test_study_that_is_refused_or_lacks_a_library_leaves_no_entry(
     assert (other / "notes.txt").read_text() == "mine"
 
 
-def test_study_that_was_cancelled_is_continued_with_the_rows_it_has(studio: Studio) -> None:
+def test_study_that_is_cancelled_is_told_of_nobody_and_stays_open_to_be_continued(
+    studio: Studio,
+) -> None:
     runner, desk = studio.runner, studio.desk
+    runner.worker = worker = StubWorker()
+    cancelled: list[tuple[int, float | None]] = []
+    worker.cancel = lambda number, patience=None, *, after=0.0: cancelled.append((number, patience))
     runner.start(OPTIMAL, QUICK)
     run = runner.run
     assert run is not None
     # Only one at a time.
     runner.start(OPTIMAL, QUICK)
     assert "is being computed" in desk.complaints.pop()
-    runner.cancel()
-    assert runner.wait_until_idle(PATIENCE)
+    for _ in range(2):
+        runner.cancel()
+    assert cancelled == [(1, work.PATIENCE)]
+    # Its process may have been ended by force.
+    worker.orders[0].failed(work.DIED)
+    assert runner.run is None
+    runner.go_on(run.name)
+    first, second = worker.orders
+    assert (second.task, second.request) == (first.task, first.request)
     assert desk.complaints == []
     assert Studies.of(desk.state).name == run.name
-    folder = studio.folders.folder(run.name)
-    kept = bytes_of(folder)
-    assert len(kept) < run.study.chunks
-    runner.go_on(run.name)
+
+
+def test_study_whose_process_dies_is_reported_and_keeps_the_rows_it_has(studio: Studio) -> None:
+    runner, desk = studio.runner, studio.desk
+
+    def is_under_way() -> bool:
+        run = runner.run
+        return run is None or (run.progress is not None and run.progress.done > 0)
+
+    runner.start(OPTIMAL, replace(QUICK, count=160))
+    run = runner.run
+    assert run is not None
+    # Once there is something to keep.
+    wait_for(is_under_way, PATIENCE)
+    number = runner.worker.process_id
+    assert number is not None
+    os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
     assert runner.wait_until_idle(PATIENCE)
-    assert desk.complaints == []
-    after = bytes_of(folder)
-    assert kept.items() <= after.items()
-    results = load_results(folder)
+    assert any("Continue the study" in each for each in desk.complaints)
+    results = load_results(studio.folders.folder(run.name))
+    assert 0 < results.count < 160
     assert results.study == run.study
     # The rows are those of the study, wherever it is computed.
-    expected = evaluate(encode_study(run.study), 0, 16).columns
+    expected = evaluate(encode_study(run.study), 0, 4).columns
+    rows = np.argsort(results.columns["index"])[:4]
     for name in ("index", "a3x", "b2", "volume", "reach"):
-        assert results.columns[name].tolist() == list(expected[name])
+        assert results.columns[name][rows].tolist() == list(expected[name])
     for design in map(results.design_of_row, range(results.count)):
         for name, value, live in zip(VARIABLES, design.variables, OPTIMAL.variables, strict=True):
             low, high = results.study.variables.get(name, (live, live))
             assert low <= value <= high
-    assert draw_study(studio.feed, Studies.of(desk.state)).is_complete
+    assert not draw_study(studio.feed, Studies.of(desk.state)).is_complete
 
 
 def test_study_that_cannot_be_is_refused_and_leaves_nothing(studio: Studio) -> None:
@@ -709,26 +737,6 @@ def test_study_that_cannot_be_is_refused_and_leaves_nothing(studio: Studio) -> N
     assert studio.desk.complaints[1:] == ["there is no study 'nowhere'; there are none yet"]
     assert studio.runner.run is None
     assert studio.folders.by_name() == {}
-
-
-def test_study_whose_process_dies_is_reported_and_keeps_what_is_finished(studio: Studio) -> None:
-    studio.runner.start(OPTIMAL, replace(QUICK, count=2000))
-
-    def is_begun() -> bool:
-        run = studio.runner.run
-        return run is None or (run.progress is not None and run.progress.done > 0)
-
-    # Once there is something to keep.
-    wait_for(is_begun, PATIENCE)
-    number = studio.runner.worker.process_id
-    assert number is not None
-    os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
-    assert studio.runner.wait_until_idle(PATIENCE)
-    assert any("Continue the study" in each for each in studio.desk.complaints)
-    assert studio.runner.run is None
-    name = Studies.of(studio.desk.state).name
-    assert name is not None
-    assert load_results(studio.folders.folder(name)).count > 0
 
 
 def test_new_study_closes_the_open_one_and_shows_the_settings(

@@ -363,8 +363,8 @@ def test_log_that_cannot_be_written_hides_no_error(
 
 THREADS = """
 import ctypes, threading
-from explorer.app.server import set_allocator
 if {is_set}:
+    from explorer.app.server import set_allocator
     set_allocator()
 library, together = ctypes.CDLL(None), threading.Barrier(8)
 def allocate():

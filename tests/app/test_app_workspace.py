@@ -250,8 +250,13 @@ def test_payload_that_does_not_count_has_no_inertia_either() -> None:
     assert feeds.loaded_design(state).payload == body.with_mass(0.0)
 
 
-@pytest.mark.parametrize("region", ["limits", "held"])
-@pytest.mark.parametrize("colour", ["plain", "margin", "condition", "share", "force"])
+@pytest.mark.parametrize(
+    ("region", "colour"),
+    [
+        *(("limits", colour) for colour in ("plain", "margin", "condition", "share", "force")),
+        ("held", "plain"),
+    ],
+)
 def test_legend_names_the_measure_of_the_map_and_the_levels_of_its_bands(
     services: Services, region: str, colour: str
 ) -> None:

@@ -134,8 +134,9 @@ def test_no_joint_is_faster_than_its_speed() -> None:
 
 
 @compiled
-@pytest.mark.parametrize("unit_mm", [1e-3, 0.7, 10.0, 25.4, 1e4])
-@pytest.mark.parametrize("end", [0, 1])
+@pytest.mark.parametrize(
+    ("unit_mm", "end"), [(1e-3, 0), (10.0, 0), (25.4, 0), (0.7, 1), (25.4, 1), (1e4, 1)]
+)
 def test_home_on_the_ends_of_all_ranges_is_within_those_of_the_files(
     unit_mm: float, end: int, tmp_path: Path
 ) -> None:
