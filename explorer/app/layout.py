@@ -154,7 +154,10 @@ def ask_for_room(client: viser.ClientHandle) -> None:
 
 TITLE = "Flagged 4-4 explorer"
 SIDES: tuple[Side, ...] = get_args(Side)
-PRODUCT = f'<div class="ex-product"><b>{TITLE}</b><small>six actuators, four legs</small></div>'
+PRODUCT = (
+    f'<div class="ex-product"><b>{TITLE}</b>'
+    '<small class="ex-dim ex-small">six actuators, four legs</small></div>'
+)
 
 
 class Bar:

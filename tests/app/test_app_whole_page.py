@@ -107,7 +107,9 @@ def test_numbers_of_computed_drawings_are_written_alike(running: Running) -> Non
     check_numbers(running)
 
 
-FIGURE = re.compile(r'class="ex-figure"[^>]*><span class="ex-dim">(.*?)</span><b[^>]*>(.*?)</b>')
+FIGURE = re.compile(
+    r'class="ex-figure"[^>]*><span class="ex-dim ex-small">(.*?)</span><b[^>]*>(.*?)</b>'
+)
 ROW = re.compile("<tr[^>]*>(.*?)</tr>")
 CELL = re.compile("<td[^>]*>(.*?)</td>")
 TAG = re.compile("<[^>]*>")

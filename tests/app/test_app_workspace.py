@@ -273,7 +273,7 @@ def test_legend_names_the_measure_of_the_map_and_the_levels_of_its_bands(
     }[mapped.colouring.banded]
     assert f'<span class="ex-dim">{name}</span>' in text
     assert read in mapped.words_at((10.0, 5.0, 9.0), state.unit)
-    ticks = text[text.index('class="ex-ticks"') :].split("</div>")[0]
+    ticks = text[text.index('class="ex-ticks') :].split("</div>")[0]
     marked = re.findall(r">([\d.,]+)<", ticks)
     levels = [level for level in mapped.colouring.bands.levels if math.isfinite(level)]
     texts = {format_number(factor * level, digits) for level in levels for digits in (2, 3)}

@@ -218,7 +218,7 @@ def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> s
         hint: Sentence on what it measures.
         look: Class of the value, such as "ex-close".
     """
-    content = f'<span class="ex-dim">{escape(name)}</span><b class="{look}">{value}</b>'
+    content = f'<span class="ex-dim ex-small">{escape(name)}</span><b class="{look}">{value}</b>'
     return open_button(opens, content, hint=hint, class_name="ex-figure")
 
 
@@ -234,7 +234,8 @@ def activity(opens: str, title: str, words: str, share: float | None, buttons: s
     """
     bar = "" if share is None else meter(100.0 * share, look="ex-meter is-thin")
     content = (
-        f'<b class="ex-cut">{escape(title)}</b><span class="ex-dim">{escape(words)}</span>{bar}'
+        f'<b class="ex-cut">{escape(title)}</b>'
+        f'<span class="ex-dim ex-small">{escape(words)}</span>{bar}'
     )
     title_button = open_button(opens, content, hint=f"Open the tab {opens}.", class_name="ex-name")
     return f'<span class="ex-running">{title_button}{buttons}</span>'

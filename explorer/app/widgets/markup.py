@@ -76,7 +76,7 @@ def ticks(*places: tuple[float, str]) -> str:
         f'<span{" class=is-end" if left == 100.0 else ""} style="--left:{left:g}%">{text}</span>'
         for left, text in places
     )
-    return f'<div class="ex-ticks">{texts}</div>'
+    return f'<div class="ex-ticks ex-dim ex-small">{texts}</div>'
 
 
 def beside(count: Literal[2, 3], *, wide: bool = False) -> str:

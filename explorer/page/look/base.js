@@ -11,3 +11,5 @@ window.explorer.recall ??= (name) =>
 window.explorer.keep ??= (name, value) => {
   document.cookie = `explorer-${name}=${value}; path=/; max-age=31536000; samesite=strict`;
 };
+// Calls a function at events of a type, before what they happen to hears of them.
+window.explorer.capture ??= (type, run) => addEventListener(type, run, true);

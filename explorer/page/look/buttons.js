@@ -2,6 +2,7 @@
 // What the pointer or the focus of the keyboard rests on, [data-hover=name], is sent as a press of
 // that name with the same value, and without a value once it is left.
 window.explorer.buttons ??= (() => {
+  const { capture } = window.explorer;
   let inbox = null;
   // Two equal presses in a row must be different messages, even if they come from two pages or
   // from one page before and after it was loaded again.
@@ -24,38 +25,26 @@ window.explorer.buttons ??= (() => {
   // counts, and the focus of the keyboard stays.
   let pressed = null;
   let focused = null;
-  addEventListener(
-    "pointerdown",
-    ({ target }) => {
-      pressed = buttonAt(target);
-      focused = null;
-    },
-    true,
-  );
-  addEventListener(
-    "pointerup",
-    ({ target }) => {
-      const button = buttonAt(target);
-      if (button && pressed && !pressed.isConnected && isSame(button, pressed)) button.click();
-      pressed = null;
-    },
-    true,
-  );
+  capture("pointerdown", ({ target }) => {
+    pressed = buttonAt(target);
+    focused = null;
+  });
+  capture("pointerup", ({ target }) => {
+    const button = buttonAt(target);
+    if (button && pressed && !pressed.isConnected && isSame(button, pressed)) button.click();
+    pressed = null;
+  });
   addEventListener("focusin", ({ target }) => {
     focused = buttonAt(target);
   });
   // Markup that is there until the next press, [data-until-press=name]: a press anywhere but in
   // the scene, which turns the camera, is sent as a press of that name.
-  addEventListener(
-    "pointerdown",
-    ({ target }) => {
-      if (target.localName === "canvas") return;
-      for (const { dataset } of document.querySelectorAll("[data-until-press]")) {
-        window.explorer.press(dataset.untilPress, "");
-      }
-    },
-    true,
-  );
+  capture("pointerdown", ({ target }) => {
+    if (target.localName === "canvas") return;
+    for (const { dataset } of document.querySelectorAll("[data-until-press]")) {
+      window.explorer.press(dataset.untilPress, "");
+    }
+  });
   // Milliseconds between two reports of what is rested on.
   const HOVER_PAUSE = 80;
   const isThere = ({ name, value }) =>
@@ -89,15 +78,11 @@ window.explorer.buttons ??= (() => {
     if (!relatedTarget) pointAt(null);
   });
   for (const type of ["pointermove", "pointerdown"]) {
-    addEventListener(
-      type,
-      ({ target }) => {
-        if (moved === "pointer") return;
-        moved = "pointer";
-        pointAt(target);
-      },
-      true,
-    );
+    capture(type, ({ target }) => {
+      if (moved === "pointer") return;
+      moved = "pointer";
+      pointAt(target);
+    });
   }
   addEventListener("focusin", ({ target }) => {
     if (!target.matches?.("[data-hover]:focus-visible")) return;

@@ -3,7 +3,7 @@
 window.explorer.fields ??= (() => {
   // Milliseconds of rest after which a typed number is entered.
   const PAUSE = 700;
-  const { clock } = window.explorer;
+  const { capture, clock } = window.explorer;
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   const { setSelectionRange } = HTMLInputElement.prototype;
   const isField = (it) => it instanceof HTMLInputElement && it.inputMode === "decimal";
@@ -156,174 +156,122 @@ window.explorer.fields ??= (() => {
     typing = { field, first: value, before: value, text: value };
     choose();
   };
-  addEventListener(
-    "focusin",
-    ({ target }) => {
-      typing = null;
-      if (!isField(target)) return;
-      acceptFocus(target);
-      startTyping(target);
-    },
-    true,
-  );
-  addEventListener(
-    "input",
-    (event) => {
-      if (!isField(event.target)) return;
-      if (!typing || typing.field !== event.target) {
-        startTyping(event.target);
-      }
-      if (typing.isReplacing) return;
-      event.stopPropagation();
-      wait();
-      // Nothing may be written into the field while an input method composes text.
-      if (event.isComposing) clock.cancel(typing.pause);
-      typing.text = typing.field.value;
-      choose();
-      if (!typing.isPending) requestAnimationFrame(watch);
-      typing.isPending = typing.isEdited = true;
-    },
-    true,
-  );
+  capture("focusin", ({ target }) => {
+    typing = null;
+    if (!isField(target)) return;
+    acceptFocus(target);
+    startTyping(target);
+  });
+  capture("input", (event) => {
+    if (!isField(event.target)) return;
+    if (!typing || typing.field !== event.target) {
+      startTyping(event.target);
+    }
+    if (typing.isReplacing) return;
+    event.stopPropagation();
+    wait();
+    // Nothing may be written into the field while an input method composes text.
+    if (event.isComposing) clock.cancel(typing.pause);
+    typing.text = typing.field.value;
+    choose();
+    if (!typing.isPending) requestAnimationFrame(watch);
+    typing.isPending = typing.isEdited = true;
+  });
   // The page would turn every comma into a point and report the number itself.
-  addEventListener(
-    "paste",
-    (event) => {
-      if (isField(event.target)) event.stopPropagation();
-    },
-    true,
-  );
-  addEventListener(
-    "beforeinput",
-    (event) => {
-      const { target, inputType } = event;
-      if (!isField(target)) return;
-      // The browser does not know what scripts wrote into its fields, and would undo wrongly.
-      if (inputType.startsWith("history")) event.preventDefault();
-      // The explorer may have written another number since.
-      if (typing && typing.field === target) hold();
-    },
-    true,
-  );
-  addEventListener(
-    "compositionend",
-    ({ target }) => {
-      if (typing && typing.field === target && typing.isPending) wait();
-    },
-    true,
-  );
+  capture("paste", (event) => {
+    if (isField(event.target)) event.stopPropagation();
+  });
+  capture("beforeinput", (event) => {
+    const { target, inputType } = event;
+    if (!isField(target)) return;
+    // The browser does not know what scripts wrote into its fields, and would undo wrongly.
+    if (inputType.startsWith("history")) event.preventDefault();
+    // The explorer may have written another number since.
+    if (typing && typing.field === target) hold();
+  });
+  capture("compositionend", ({ target }) => {
+    if (typing && typing.field === target && typing.isPending) wait();
+  });
   document.addEventListener("selectionchange", () => {
     if (!typing || typing.isReplacing) return;
     if (typing.field.value === typing.text) choose();
     else hold();
   });
-  addEventListener(
-    "keydown",
-    (event) => {
-      const { target, key } = event;
-      if (!typing || typing.field !== target || typing.isReplacing || event.isComposing) return;
-      hold();
-      if ((event.ctrlKey || event.metaKey) && /^[zy]$/i.test(key)) {
-        event.preventDefault();
-        event.stopPropagation();
-        if (typing.isPending) giveUp();
-        else passToPage(event);
-        return;
-      }
-      if (typing.isEdited && key === "Escape") {
-        write.call(target, typing.first);
-        enter();
-      }
-      if (typing.isPending && ["Enter", "Tab", "ArrowUp", "ArrowDown"].includes(key)) enter();
-      if (key === "Enter") {
-        event.stopPropagation();
-        target.blur();
-        return;
-      }
-      // The page's field would act on a text that it does not know.
-      const isTyped = key.length === 1 && !event.ctrlKey && !event.metaKey;
-      if (isTyped || ["Backspace", "Delete", "ArrowLeft", "ArrowRight"].includes(key)) {
-        event.stopPropagation();
-      }
-    },
-    true,
-  );
-  // This runs before the field loses the focus, since a field that gets a number takes it back.
-  addEventListener(
-    "pointerdown",
-    ({ target }) => {
-      if (typing && typing.field === target) hold();
-      else if (typing && typing.isPending) finish();
-      // The arrows of a field need its focus.
-      const field = target.closest?.(".mantine-NumberInput-root")?.querySelector("input");
-      if (field) acceptFocus(field);
-    },
-    true,
-  );
-  addEventListener(
-    "change",
-    (event) => {
-      if (!typing || typing.field !== event.target || !typing.isPending) return;
+  capture("keydown", (event) => {
+    const { target, key } = event;
+    if (!typing || typing.field !== target || typing.isReplacing || event.isComposing) return;
+    hold();
+    if ((event.ctrlKey || event.metaKey) && /^[zy]$/i.test(key)) {
+      event.preventDefault();
       event.stopPropagation();
-      finish();
-    },
-    true,
-  );
-  addEventListener(
-    "focusout",
-    (event) => {
-      if (!typing || typing.field !== event.target) return;
-      if (typing.isPending) finish();
-      // The page would clamp the number to the range, although the range is about to follow it.
-      if (typing.isEdited) {
-        event.stopPropagation();
-        refuseFocus(typing.field);
-      }
-      typing = null;
-    },
-    true,
-  );
+      if (typing.isPending) giveUp();
+      else passToPage(event);
+      return;
+    }
+    if (typing.isEdited && key === "Escape") {
+      write.call(target, typing.first);
+      enter();
+    }
+    if (typing.isPending && ["Enter", "Tab", "ArrowUp", "ArrowDown"].includes(key)) enter();
+    if (key === "Enter") {
+      event.stopPropagation();
+      target.blur();
+      return;
+    }
+    // The page's field would act on a text that it does not know.
+    const isTyped = key.length === 1 && !event.ctrlKey && !event.metaKey;
+    if (isTyped || ["Backspace", "Delete", "ArrowLeft", "ArrowRight"].includes(key)) {
+      event.stopPropagation();
+    }
+  });
+  // This runs before the field loses the focus, since a field that gets a number takes it back.
+  capture("pointerdown", ({ target }) => {
+    if (typing && typing.field === target) hold();
+    else if (typing && typing.isPending) finish();
+    // The arrows of a field need its focus.
+    const field = target.closest?.(".mantine-NumberInput-root")?.querySelector("input");
+    if (field) acceptFocus(field);
+  });
+  capture("change", (event) => {
+    if (!typing || typing.field !== event.target || !typing.isPending) return;
+    event.stopPropagation();
+    finish();
+  });
+  capture("focusout", (event) => {
+    if (!typing || typing.field !== event.target) return;
+    if (typing.isPending) finish();
+    // The page would clamp the number to the range, although the range is about to follow it.
+    if (typing.isEdited) {
+      event.stopPropagation();
+      refuseFocus(typing.field);
+    }
+    typing = null;
+  });
 
   // A line of text reports no change while it is empty or ends with a blank: more is being typed.
   let line = null;
   const isLine = (it) => it instanceof HTMLInputElement && !!it.closest(".mantine-TextInput-root");
-  addEventListener(
-    "focusin",
-    ({ target }) => {
-      line = isLine(target) ? { field: target, before: target.value } : null;
-    },
-    true,
-  );
-  addEventListener(
-    "input",
-    (event) => {
-      if (line && line.field === event.target && !/\S$/.test(line.field.value)) {
-        event.stopPropagation();
-      }
-    },
-    true,
-  );
-  addEventListener(
-    "keydown",
-    (event) => {
-      if (event.key !== "Enter" || event.isComposing || !isLine(event.target)) return;
+  capture("focusin", ({ target }) => {
+    line = isLine(target) ? { field: target, before: target.value } : null;
+  });
+  capture("input", (event) => {
+    if (line && line.field === event.target && !/\S$/.test(line.field.value)) {
       event.stopPropagation();
-      event.target.blur();
-    },
-    true,
-  );
-  addEventListener(
-    "focusout",
-    ({ target }) => {
-      if (!line || line.field !== target) return;
-      const text = target.value.trim() || line.before;
-      line = null;
-      if (text === target.value) return;
-      write.call(target, text);
-      target.dispatchEvent(new Event("input", { bubbles: true }));
-    },
-    true,
-  );
+    }
+  });
+  capture("keydown", (event) => {
+    if (event.key !== "Enter" || event.isComposing || !isLine(event.target)) return;
+    event.stopPropagation();
+    event.target.blur();
+  });
+  capture("focusout", ({ target }) => {
+    if (!line || line.field !== target) return;
+    const text = target.value.trim() || line.before;
+    line = null;
+    if (text === target.value) return;
+    write.call(target, text);
+    target.dispatchEvent(new Event("input", { bubbles: true }));
+  });
 
   // A checkbox or option that was clicked would keep all keys to itself, so it loses the focus; one
   // that was chosen with the keyboard keeps it.

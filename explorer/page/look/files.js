@@ -46,15 +46,11 @@ window.explorer.files ??= (() => {
     waiting.push(...files);
     if (!isSending) window.explorer.sendFile();
   };
-  addEventListener(
-    "change",
-    (event) => {
-      if (event.target.id !== `file_upload_${button}`) return;
-      event.stopPropagation();
-      open(event.target.files);
-    },
-    true,
-  );
+  window.explorer.capture("change", (event) => {
+    if (event.target.id !== `file_upload_${button}`) return;
+    event.stopPropagation();
+    open(event.target.files);
+  });
   const hasFiles = ({ dataTransfer }) => dataTransfer?.types.includes("Files");
   addEventListener("dragover", (event) => {
     if (!hasFiles(event)) return;

@@ -60,7 +60,7 @@ window.explorer.graphics ??= (() => {
     message.remove();
     forEachDrawn((each) => each.isInstancedMesh2 && each.initIndexAttribute());
   };
-  addEventListener("webglcontextlost", lose, true);
-  addEventListener("webglcontextrestored", find, true);
+  window.explorer.capture("webglcontextlost", lose);
+  window.explorer.capture("webglcontextrestored", find);
   return true;
 })();

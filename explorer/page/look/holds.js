@@ -2,7 +2,7 @@
 // control sends its last value up to 50 ms after the frame that follows its release, which is
 // reported after that.
 window.explorer.holds ??= (() => {
-  const { clock } = window.explorer;
+  const { capture, clock } = window.explorer;
   // Time from that frame to the report.
   const LATE_MILLISECONDS = 100;
   // Id of the number field of this tab, which a new connection replaces.
@@ -35,58 +35,34 @@ window.explorer.holds ??= (() => {
     isHeld = false;
     pause();
   };
-  addEventListener(
-    "pointerdown",
-    (event) => {
-      if (!event.isPrimary || event.button !== 0) return;
-      // The release of the previous press may have been lost.
-      end();
-      number += 1;
-      isHeld = true;
-      goOn();
-    },
-    true,
-  );
-  addEventListener(
-    "pointermove",
-    (event) => {
-      if (!event.isPrimary || !isHeld) return;
-      if (event.buttons & 1) goOn();
-      else release();
-    },
-    true,
-  );
-  addEventListener(
-    "pointerup",
-    (event) => {
-      if (event.isPrimary && event.button === 0) release();
-    },
-    true,
-  );
+  capture("pointerdown", (event) => {
+    if (!event.isPrimary || event.button !== 0) return;
+    // The release of the previous press may have been lost.
+    end();
+    number += 1;
+    isHeld = true;
+    goOn();
+  });
+  capture("pointermove", (event) => {
+    if (!event.isPrimary || !isHeld) return;
+    if (event.buttons & 1) goOn();
+    else release();
+  });
+  capture("pointerup", (event) => {
+    if (event.isPrimary && event.button === 0) release();
+  });
   // What a key does belongs to no press that is over.
-  addEventListener(
-    "keydown",
-    () => {
-      if (!isHeld) end();
-    },
-    true,
-  );
+  capture("keydown", () => {
+    if (!isHeld) end();
+  });
   // A touch may go on after the browser has cancelled its pointer.
-  addEventListener(
-    "pointercancel",
-    (event) => {
-      if (event.isPrimary && event.pointerType !== "touch") release();
-    },
-    true,
-  );
+  capture("pointercancel", (event) => {
+    if (event.isPrimary && event.pointerType !== "touch") release();
+  });
   for (const name of ["touchend", "touchcancel"]) {
-    addEventListener(
-      name,
-      ({ touches }) => {
-        if (!touches.length) release();
-      },
-      true,
-    );
+    capture(name, ({ touches }) => {
+      if (!touches.length) release();
+    });
   }
   // A release in another window is never reported; a pointer that is still held moves again later.
   addEventListener("blur", pause);

@@ -9,10 +9,8 @@ window.explorer.keys ??= (() => {
     if (kind === "Key" && IS_OTHER_SCRIPT.test(key)) return name.toLowerCase();
     return kind === "Digit" && !shiftKey && !/^[a-z]/i.test(key) ? name : key;
   };
-  addEventListener(
-    "keydown",
-    (event) => Object.defineProperty(event, "key", { value: nameOf(event) }),
-    true,
+  window.explorer.capture("keydown", (event) =>
+    Object.defineProperty(event, "key", { value: nameOf(event) }),
   );
   return true;
 })();

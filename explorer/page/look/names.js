@@ -1,6 +1,7 @@
 // Gives each control the words beside it as its name for screen readers, the browser's tab the names
 // of design and product, and puts hints beside the panel, where they cover no control.
 window.explorer.names ??= (() => {
+  const { capture } = window.explorer;
   const CONTROLS =
     "[role=slider], input:not([type=hidden]):not([type=file]):not([type=checkbox]), textarea";
   // Names of buttons by their icon.
@@ -95,7 +96,7 @@ window.explorer.names ??= (() => {
     pointed = target;
     mark();
   };
-  addEventListener("pointerover", pointAt, true);
-  for (const event of ["focusin", "focusout"]) addEventListener(event, mark, true);
+  capture("pointerover", pointAt);
+  for (const event of ["focusin", "focusout"]) capture(event, mark);
   return { labelOf };
 })();

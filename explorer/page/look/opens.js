@@ -63,20 +63,16 @@ window.explorer.opens ??= (() => {
   addEventListener("click", ({ target }) => {
     if (target.closest?.("[data-closes] [data-press]")) closeDialogs();
   });
-  addEventListener(
-    "keydown",
-    ({ key, target }) => {
-      // The palette may lie over a dialog, and is closed first; a list in a dialog too.
-      const isOver = target.closest?.(
-        ".mantine-Spotlight-content, [aria-haspopup][aria-expanded=true]",
-      );
-      if (key !== "Escape" || isOver) return;
-      if (document.querySelector(OPEN)) closeDialogs();
-      // In a field it discards what is typed.
-      else if (target.localName !== "input") document.querySelector(CARD_CLOSE)?.click();
-    },
-    true,
-  );
+  window.explorer.capture("keydown", ({ key, target }) => {
+    // The palette may lie over a dialog, and is closed first; a list in a dialog too.
+    const isOver = target.closest?.(
+      ".mantine-Spotlight-content, [aria-haspopup][aria-expanded=true]",
+    );
+    if (key !== "Escape" || isOver) return;
+    if (document.querySelector(OPEN)) closeDialogs();
+    // In a field it discards what is typed.
+    else if (target.localName !== "input") document.querySelector(CARD_CLOSE)?.click();
+  });
   // A pointer pressed in a dialog and released beside it, as to select text, closes nothing.
   shade.addEventListener("click", closeDialogs);
   window.explorer.open = open;

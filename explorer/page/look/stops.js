@@ -46,16 +46,12 @@ window.explorer.stops ??= (() => {
     known.add(head);
     if ((folders[nameOf(head)] ?? isOpen(head)) !== isOpen(head)) head.click();
   };
-  addEventListener(
-    "click",
-    ({ target }) => {
-      const head = target.closest?.(HEAD);
-      if (!head) return;
-      folders[nameOf(head)] = !isOpen(head);
-      storage?.setItem(KEY, JSON.stringify(folders));
-    },
-    true,
-  );
+  window.explorer.capture("click", ({ target }) => {
+    const head = target.closest?.(HEAD);
+    if (!head) return;
+    folders[nameOf(head)] = !isOpen(head);
+    storage?.setItem(KEY, JSON.stringify(folders));
+  });
   // The nearest button in the direction of an arrow; one aside counts as farther.
   const neighbour = (items, from, [right, down]) => {
     const middleOf = (it) => {
@@ -73,19 +69,15 @@ window.explorer.stops ??= (() => {
     }
     return best;
   };
-  addEventListener(
-    "keydown",
-    (event) => {
-      const { target, key } = event,
-        group = target.closest?.(TOOLBAR);
-      if (target.matches?.(HEAD) && (key === "Enter" || key === " ")) target.click();
-      else if (group && ARROWS[key]) neighbour(itemsOf(group), target, ARROWS[key])?.focus();
-      else return;
-      event.preventDefault();
-      event.stopPropagation();
-    },
-    true,
-  );
+  window.explorer.capture("keydown", (event) => {
+    const { target, key } = event,
+      group = target.closest?.(TOOLBAR);
+    if (target.matches?.(HEAD) && (key === "Enter" || key === " ")) target.click();
+    else if (group && ARROWS[key]) neighbour(itemsOf(group), target, ARROWS[key])?.focus();
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  });
   addEventListener("focusin", ({ target }) => {
     const group = target.closest?.(`${TOOLBAR}, [role=tablist]`);
     if (group) setStop(itemsOf(group), target);

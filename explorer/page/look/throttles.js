@@ -2,7 +2,7 @@
 // panel share a throttle of viser that keeps the newest message only, so that the last value of a
 // control would be lost if another control is used within the throttle's time.
 window.explorer.throttles ??= (() => {
-  const { clock } = window.explorer;
+  const { capture, clock } = window.explorer;
   // The throttle's time in milliseconds, by which its timer is known.
   const PAUSE = 50;
   const EVENTS = ["pointerdown", "pointerup", "click", "keydown", "input", "focusout"];
@@ -55,7 +55,7 @@ window.explorer.throttles ??= (() => {
       end();
     }
   };
-  for (const name of EVENTS) addEventListener(name, flush, true);
+  for (const name of EVENTS) capture(name, flush);
   watch();
   return true;
 })();

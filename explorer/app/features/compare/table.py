@@ -242,7 +242,9 @@ def measure_row(
             if value is not None and first is not None and value != first:
                 text = value_text(measure, value - first, size, signed=True)
             text = f'<span class="ex-{change}">{text}</span>' if change else text
-            cells.append(f'<td class="ex-change">{"" if text == "0" else text}</td>')
+            cells.append(
+                f'<td class="ex-change ex-dim ex-small">{"" if text == "0" else text}</td>'
+            )
     unit = columns[0].unit_of(measure).name
     unit_html = f' <span class="ex-dim ex-small">{unit}</span>' if unit else ""
     return (
@@ -281,7 +283,7 @@ def bars(columns: Sequence[Column]) -> str:
         CATALOGUE[name] for name in LOADS if any(each.has(CATALOGUE[name]) for each in columns)
     ]
     drawings = (_drawing(measure, columns) for measure in drawn)
-    return f'<div class="ex-bars">{"".join(drawings)}</div>'
+    return f'<div class="ex-bars ex-small">{"".join(drawings)}</div>'
 
 
 def _drawing(measure: Measure, columns: Sequence[Column]) -> str:

@@ -189,7 +189,7 @@ class DesignName:
         if self._saved is None:
             return f'<span class="ex-name">{name}</span>'
         mark, words = saved_words(live, self._saved.find(live.name))
-        content = f'{name}<span class="ex-dim">{mark}</span>'
+        content = f'{name}<span class="ex-dim ex-small">{mark}</span>'
         hint = f"{words} Save, rename, open or upload designs."
         return open_button("Designs", content, hint=hint, class_name="ex-name") + self._warning()
 

@@ -98,7 +98,7 @@ class HistoryPanel:
         return press_button(
             GO,
             step.number,
-            f'<span class="ex-index">{step.number}</span>{escape(step.words)}{by}',
+            f'<span class="ex-dim ex-index">{step.number}</span>{escape(step.words)}{by}',
             hint=f"Go to step {step.number}: {step.words}",
             class_name=f"ex-row {'is-undone' if step.number > here.number else look}".rstrip(),
         )

@@ -265,7 +265,7 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
         '<div class="ex-dim ex-small">Press one to go to its nearest pose. Dimensions on the left, '
         f"motions in {frame.state.unit.name}.</div>"
         f'<div class="ex-strata" style="--height:{6 * ROW + NODE_HEIGHT + 4}px">'
-        f'{_edges(here)}<div class="ex-ranks">{ranks}</div>'
+        f'{_edges(here)}<div class="ex-ranks ex-dim ex-small">{ranks}</div>'
         f'<div class="ex-nodes" role="toolbar" aria-label="Strata">{nodes}</div></div>'
     )
 

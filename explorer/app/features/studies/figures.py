@@ -318,7 +318,7 @@ def lines_html(plotted: PlotRows) -> str:
     )
     drawing = _drawing(plotted, "lines", np.array(grid), boxes)
     return (
-        f'<div class="ex-plot is-lines" style="--columns:{len(names)}">'
+        f'<div class="ex-plot is-lines ex-dim ex-small" style="--columns:{len(names)}">'
         f"{titles}{most}{drawing}{least}</div>{reading(HINTS['lines'])}"
     )
 
@@ -334,7 +334,7 @@ def points_html(plotted: PlotRows) -> str:
     boxes = [_box(x, y) for x in columns or free for y in rows or free if columns or rows]
     drawing = _drawing(plotted, "points", np.reshape(grid, (-1, 2, 2)), boxes)
     return (
-        '<div class="ex-plot is-points">'
+        '<div class="ex-plot is-points ex-dim ex-small">'
         f"{plotted.title_of(plotted.up)}{_values('up', 'top', 1.0 - y, up * upward.factor)}"
         f"{drawing}{_values('across', 'left', x, across * onward.factor)}"
         f"{plotted.title_of(plotted.across)}</div>{reading(HINTS['points'])}"
