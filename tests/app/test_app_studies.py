@@ -351,7 +351,7 @@ def draw_study(feed: StudyFeed, studies: Studies) -> StudyDrawing:
 
 def designs_in(html: str) -> list[str]:
     """Return the paths of the designs of a plot, one for each, in any order."""
-    drawn = re.findall('<path class="(?:|front)" style="[^"]*" d="([^"]*)"/>', html)
+    drawn = re.findall('<path(?: class="front")? style="[^"]*" d="([^"]*)">', html)
     return sorted(f"M{each}" for path in drawn for each in path.split("M")[1:])
 
 
@@ -461,7 +461,7 @@ def test_plots_show_brushes_and_the_picked_design(feed: StudyFeed, home: Path) -
         assert found == pytest.approx([low, high], rel=1e-3)
 
 
-BOX = r'<rect class="brush" x="(\d+)" y="(\d+)" width="(\d+)" height="(\d+)"/>'
+BOX = r'<rect class="brush" x="(\d+)" y="(\d+)" width="(\d+)" height="(\d+)">'
 
 
 def test_place_on_a_plot_has_the_nearest_design_and_the_axes_there(

@@ -51,6 +51,8 @@ def element(tag: str, *pieces: Piece, **attributes: str | float | None) -> Eleme
 
 def printable(text: str) -> str:
     """Return text with control characters and lone surrogates replaced, except line breaks."""
+    if text.isprintable():
+        return text
     return "".join(
         "\N{REPLACEMENT CHARACTER}" if category(c).startswith("C") and c != "\n" else c
         for c in text
@@ -86,10 +88,29 @@ def line(ends: ArrayLike, class_: str | None = None, *, stroke: str | None = Non
 
 
 def drawing_text(
-    words: str, x: float, y: float, class_: str = "small", *, anchor: str | None = None
+    words: str, x: float, y: float, class_: str | None = "small", *, anchor: str | None = None
 ) -> Element:
     """Return words that start at (x, y) in a drawing; `anchor` may be their "middle" or "end"."""
     return element("text", words, x=x, y=y, class_=class_, text_anchor=anchor)
+
+
+def circle(
+    at: Sequence[float], radius: float, class_: str | None = None, *, fill: str | None = None
+) -> Element:
+    """Return a circle of a drawing."""
+    x, y = at
+    return element("circle", class_=class_, cx=x, cy=y, r=radius, fill=fill)
+
+
+def page_picture(
+    look: str | None, label: str, *pieces: Element | None, **attributes: str | float
+) -> str:
+    """Return a drawing in the page as SVG text, with its class and its name for screen readers.
+
+    Further attributes are its size, and facts that a script of the page reads.
+    """
+    named = {"role": "img", "aria-label": label}
+    return as_html(element("svg", *pieces, class_=look, **named, **attributes))
 
 
 def number(value: float, digits: int = 6) -> Element:

@@ -8,9 +8,20 @@ column keep texts apart whatever the design.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Literal
+from xml.etree.ElementTree import Element
 
+import numpy as np
+
+from explorer.export.drawings.markup import (
+    circle,
+    drawing_text,
+    element,
+    line,
+    page_picture,
+    path_of,
+)
 from explorer.mechanism.design import Design
 
 Xy = tuple[float, float]
@@ -33,37 +44,27 @@ def sketch(design: Design) -> str:
     """Return the sketch of a design as SVG."""
     base = {"a1": 0.0, "a2": design.reach}
     platform = {"b4": 0.0, "b2": design.b2, "b3": design.b3}
-    drawn = _figure(("Base", 0.0), base, (), ("a3", design.a3)) + _figure(
-        ("Platform", WIDTH - FIGURE_WIDTH), platform, ("b2", "b3"), ("b1", design.b1)
+    return page_picture(
+        "ex-sketch",
+        "Base and platform from above, with the design variables",
+        *_figure(("Base", 0.0), base, (), ("a3", design.a3)),
+        *_figure(("Platform", WIDTH - FIGURE_WIDTH), platform, ("b2", "b3"), ("b1", design.b1)),
+        width=WIDTH,
+        height=HEIGHT,
     )
-    return (
-        f'<svg class="ex-sketch" width="{WIDTH}" height="{HEIGHT}" role="img" '
-        f'aria-label="Base and platform from above, with the design variables">{drawn}</svg>'
-    )
-
-
-def _line(look: str, start: Xy, end: Xy) -> str:
-    (x1, y1), (x2, y2) = start, end
-    return f'<line class="{look}" x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>'
-
-
-def _word(text: str, at: Xy, anchor: Anchor = "middle", look: str = "is-point") -> str:
-    """Return a text with the place of its anchor and of its middle, y downwards."""
-    x, y = at
-    return f'<text class="{look}" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{text}</text>'
 
 
 def _dimension(
     name: str, at: Xy, anchor: Anchor, ends: tuple[Xy, Xy], measured: tuple[Xy, Xy]
-) -> str:
+) -> Element:
     """Return a dimension line with its text at a place, and thin lines from what it measures.
 
     Ticks cross its ends at half a right angle.
     """
-    thin = "".join(_line("is-thin", *pair) for pair in zip(measured, ends, strict=True))
-    ticks = "".join(_line("", (x - TICK, y + TICK), (x + TICK, y - TICK)) for x, y in ends)
-    word = _word(name, at, anchor, "")
-    return f'<g data-variable="{name}">{thin}{_line("", *ends)}{ticks}{word}</g>'
+    thin = (line(pair, "is-thin") for pair in zip(measured, ends, strict=True))
+    ticks = (line(((x - TICK, y + TICK), (x + TICK, y - TICK))) for x, y in ends)
+    word = drawing_text(name, *at, None, anchor=anchor)
+    return element("g", *thin, line(ends), *ticks, word, data_variable=name)
 
 
 def _figure(
@@ -71,8 +72,8 @@ def _figure(
     on_axis: Mapping[str, float],
     along: tuple[str, ...],
     apex: tuple[str, Xy],
-) -> str:
-    """Return a figure as SVG, with points on an axis, the origin first, and a triangle's apex.
+) -> Iterator[Element]:
+    """Yield a figure, with points on an axis, the origin first, and a triangle's apex.
 
     Its caption comes with its left end; the points `along` the axis have dimensions. The last two
     points on the axis are the other corners of the triangle.
@@ -99,37 +100,37 @@ def _figure(
 
     origin, tip = place(0.0), place(apex_x, apex_y)
     points = {each: place(x) for each, x in on_axis.items()}
-    dimensions = ""
+    dimensions: list[Element] = []
     rows = sorted(along, key=lambda each: abs(on_axis[each]))
     for index, each in enumerate(rows):
         row_y = axis_y - up * (OFF_AXIS + ROW * (1.0 + index))
-        dimensions += _along(each, origin, points[each], row_y, left)
+        dimensions.append(_along(each, origin, points[each], row_y, left))
     tip_row = (
         axis_y - up * (OFF_AXIS + ROW * (1.0 + len(rows)))
         if apex_is_away
         else tip[1] + up * (OFF_AXIS + ROW)
     )
-    dimensions += _along(f"{name}x", origin, tip, tip_row, left)
+    dimensions.append(_along(f"{name}x", origin, tip, tip_row, left))
     column = left + LEFT - BESIDE - 1.0
     middle = axis_y + up * max(0.5 * height, 0.5 * ROW)
     ends = (column, axis_y), (column, tip[1])
     measured = place(min(xs)), tip
-    dimensions += _dimension(f"{name}y", (column - BESIDE, middle), "end", ends, measured)
+    dimensions.append(_dimension(f"{name}y", (column - BESIDE, middle), "end", ends, measured))
     name_y = axis_y - up * OFF_AXIS
     names = {each: at[0] - (BESIDE - 1.0) * (each == "a1") for each, at in points.items()}
-    words = _word(title, (left, 0.5 * ROW), "start", "")
-    words += "".join(_word(each, (x, name_y)) for each, x in _spread(names, left).items())
-    words += _word(name, (tip[0], tip[1] + up * OFF_AXIS))
+    corners = np.array([tip, *list(points.values())[-2:]])
+    yield element("path", d=path_of(corners))
     stations = sorted((origin[0], *(x for x, _ in points.values())))
-    axis = _line("is-axis", (stations[0], axis_y), (stations[-1], axis_y))
-    corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in (tip, *list(points.values())[-2:]))
-    dots = "".join(
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.2"/>' for x, y in (*points.values(), tip)
-    )
-    return f'<polygon points="{corners}"/>{axis}{dots}{dimensions}{words}'
+    yield line(((stations[0], axis_y), (stations[-1], axis_y)), "is-axis")
+    yield from (circle(at, 2.2) for at in (*points.values(), tip))
+    yield from dimensions
+    yield drawing_text(title, left, 0.5 * ROW, None, anchor="start")
+    for each, x in _spread(names, left).items():
+        yield drawing_text(each, x, name_y, "is-point", anchor="middle")
+    yield drawing_text(name, tip[0], tip[1] + up * OFF_AXIS, "is-point", anchor="middle")
 
 
-def _along(name: str, origin: Xy, end: Xy, row_y: float, left: float) -> str:
+def _along(name: str, origin: Xy, end: Xy, row_y: float, left: float) -> Element:
     """Return a dimension along the axis, in a row."""
     low, high = sorted((origin[0], end[0]))
     x, anchor, width = 0.5 * (low + high), "middle", CHARACTER * len(name)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from html import escape
+from xml.etree.ElementTree import Element
 
 import msgspec
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from explorer.app.features.orientation.work import TiltsDrawing
 from explorer.app.widgets.markup import caption, dim, reading, row, swatch, table, ticks
+from explorer.export.drawings.markup import circle, drawing_text, element, page_picture, path_of
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import MARGIN_COLOURS, Rgb, css
@@ -61,18 +63,12 @@ STOPS: tuple[Rgb, ...] = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 
 ROUND = 10.0
 
 
-def _svg(label: str, data: str, facts: object, pieces: Iterable[str], height: float) -> str:
-    """Return an SVG with facts in an attribute, which a script of the page reads."""
-    attribute = f'data-{data}="{escape(msgspec.json.encode(facts).decode())}"'
-    return (
-        f'<svg class="ex-map ex-tilts" viewBox="0 0 {WIDTH:g} {height:g}" role="img" '
-        f'aria-label="{label}" {attribute}>{"".join(pieces)}</svg>'
-    )
-
-
-def _circle(look: str, at: tuple[float, float], radius: float) -> str:
-    x, y = at
-    return f'<circle class="{look}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>'
+def _chart(label: str, facts: Mapping[str, object], pieces: Iterable[Element], kind: str) -> str:
+    """Return a chart as SVG, with facts of its kind, "tilts" or "torsions", for a script."""
+    height = HEIGHT if kind == "tilts" else STRIP_HEIGHT
+    data = {f"data-{kind}": msgspec.json.encode(facts).decode()}
+    box = f"0 0 {WIDTH:g} {height:g}"
+    return page_picture("ex-map ex-tilts", label, *pieces, viewBox=box, **data)
 
 
 def _round_up(tilt: float) -> float:
@@ -104,13 +100,13 @@ def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: Tilt
     pieces = [*_rings(edge), *_region(tilts, edge), *_least(least, edge), *_labels(edge)]
     is_other = abs(math.remainder(home.torsion - here.torsion, 360.0)) > SAME_TORSION
     look = f"home{' is-other' if is_other else ''}"
-    pieces.append(_circle(look, _place(home.azimuth, home.tilt, edge), 5.0))
+    pieces.append(circle(_place(home.azimuth, home.tilt, edge), 5.0, look))
     x, y = _place(here.azimuth, here.tilt, edge)
     arms = f"M{x - 6:.1f} {y:.1f}h12M{x:.1f} {y - 6:.1f}v12"
-    pieces.append(f'<path class="cross casing" d="{arms}"/><path class="cross" d="{arms}"/>')
+    pieces += (_path(look, arms) for look in ("cross casing", "cross"))
     key = f"+ present orientation, ○ home{', at another torsion' if is_other else ''}"
     return (
-        _svg("Greatest tilt by azimuth", "tilts", facts, pieces, HEIGHT)
+        _chart("Greatest tilt by azimuth", facts, pieces, "tilts")
         + f'<div class="ex-dim">{key}</div>'
         + reading("Point at the map to read it, click to tilt there.")
     )
@@ -129,26 +125,30 @@ def legend(tilts: TiltMap) -> str:
     return table(rows)
 
 
+def _path(look: str, data: str) -> Element:
+    return element("path", class_=look, d=data)
+
+
 def _place(azimuth: float, tilt: float, edge: float) -> tuple[float, float]:
     angle, distance = math.radians(azimuth), RADIUS * tilt / edge
     return CENTRE[0] + distance * math.cos(angle), CENTRE[1] - distance * math.sin(angle)
 
 
-def _rings(edge: float) -> Iterator[str]:
+def _rings(edge: float) -> Iterator[Element]:
     """Yield the circles of tilts and the axes x and y."""
     x, y = CENTRE
     count = round(edge / RING)
     for ring in range(1, count + 1):
-        yield _circle("frame" if ring == count else "ring", CENTRE, RADIUS * ring / count)
-    yield f'<path class="ring" d="M{x - RADIUS} {y}h{2 * RADIUS}M{x} {y - RADIUS}v{2 * RADIUS}"/>'
+        yield circle(CENTRE, RADIUS * ring / count, "frame" if ring == count else "ring")
+    yield _path("ring", f"M{x - RADIUS} {y}h{2 * RADIUS}M{x} {y - RADIUS}v{2 * RADIUS}")
 
 
-def _labels(edge: float) -> Iterator[str]:
+def _labels(edge: float) -> Iterator[Element]:
     """Yield the labels of the circles and axes."""
     count = round(edge / RING)
     for ring in range(1, count + 1):
         x, y = _place(-45.0, RING * ring, edge)
-        yield f'<text class="angle" x="{x + 2:.1f}" y="{y + 10:.1f}">{RING * ring:.0f}°</text>'
+        yield drawing_text(f"{RING * ring:.0f}°", x + 2.0, y + 10.0, "angle")
     x, y = CENTRE
     for words, dx, dy, anchor in (
         ("x", RADIUS + 8, 4, "start"),
@@ -156,29 +156,28 @@ def _labels(edge: float) -> Iterator[str]:
         ("y", 0, -RADIUS - 7, "middle"),
         ("−y", 0, RADIUS + 15, "middle"),
     ):
-        yield f'<text class="axis" x="{x + dx}" y="{y + dy}" text-anchor="{anchor}">{words}</text>'
+        yield drawing_text(words, x + dx, y + dy, "axis", anchor=anchor)
 
 
-def _least(least: GreatestTilt, edge: float) -> Iterator[str]:
+def _least(least: GreatestTilt, edge: float) -> Iterator[Element]:
     """Yield the circle of the greatest tilt in every azimuth, and a dot where it ends."""
     if not math.isnan(least.tilt):
-        yield _circle("least", CENTRE, RADIUS * least.tilt / edge)
+        yield circle(CENTRE, RADIUS * least.tilt / edge, "least")
         if least.limit is not None:
-            yield _circle("dot", _place(least.azimuth, least.tilt, edge), 3.0)
+            yield circle(_place(least.azimuth, least.tilt, edge), 3.0, "dot")
 
 
-def _region(tilts: TiltMap, edge: float) -> Iterator[str]:
+def _region(tilts: TiltMap, edge: float) -> Iterator[Element]:
     """Yield the tilts that are possible, and their border in the colours of the limits."""
     azimuths, values = np.radians(tilts.azimuths), np.nan_to_num(tilts.tilts) * RADIUS / edge
     x, y = CENTRE[0] + values * np.cos(azimuths), CENTRE[1] - values * np.sin(azimuths)
     points = np.column_stack([x, y])
-    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in points.tolist())
-    yield f'<polygon class="possible" points="{outline}"/>'
+    yield _path("possible", path_of(points, decimals=1))
     middles = 0.5 * (points + np.roll(points, -1, axis=0))
     parts = np.stack([np.roll(middles, 1, axis=0), points, middles], axis=1)
     for limit, group in itertools.groupby(range(len(points)), lambda k: tilts.limits[k]):
-        path = "L".join(f"{x:.1f} {y:.1f}" for x, y in parts[[*group]].reshape(-1, 2).tolist())
-        yield f'<path class="border" stroke="{css(colour_of(limit))}" d="M{path}"/>'
+        border = path_of(parts[[*group]].reshape(-1, 2), "", 1)
+        yield element("path", class_="border", stroke=css(colour_of(limit)), d=border)
 
 
 def torsion_strip(by_torsion: TiltByTorsion, torsion: float, tilt: float) -> str:
@@ -193,13 +192,13 @@ def torsion_strip(by_torsion: TiltByTorsion, torsion: float, tilt: float) -> str
     tilts = [round(t, 1) if math.isfinite(t) else None for t in by_torsion.tilts.tolist()]
     facts = {"left": LEFT, "right": RIGHT, "tilts": tilts}
     pieces = [*_axes(top), *_area(by_torsion.torsions, tilts, top)]
-    pieces.append(f'<path class="here" d="M{_across(torsion):.1f} {TOP}V{BOTTOM}"/>')
+    pieces.append(_path("here", f"M{_across(torsion):.1f} {TOP}V{BOTTOM}"))
     if not math.isnan(best.tilt) and not best.tilt - tilt <= SAME_TILT:
         at = _across(math.remainder(best.torsion, 360.0)), _up(best.tilt, top)
-        pieces.append(_circle("dot", at, 3.0))
+        pieces.append(circle(at, 3.0, "dot"))
     return (
         caption("Greatest tilt in every azimuth by torsion")
-        + _svg("Greatest tilt by torsion", "torsions", facts, pieces, STRIP_HEIGHT)
+        + _chart("Greatest tilt by torsion", facts, pieces, "torsions")
         + reading("Click to turn the platform to a torsion.")
     )
 
@@ -212,33 +211,28 @@ def _up(tilt: float, top: float) -> float:
     return BOTTOM - (BOTTOM - TOP) * tilt / top
 
 
-def _axes(top: float) -> Iterator[str]:
+def _axes(top: float) -> Iterator[Element]:
     """Yield the frame and its labels."""
-    yield f'<path class="frame" d="M{LEFT} {TOP}V{BOTTOM}H{RIGHT}V{TOP}"/>'
+    yield _path("frame", f"M{LEFT} {TOP}V{BOTTOM}H{RIGHT}V{TOP}")
     for tilt in (0.0, top):
-        y = _up(tilt, top) + 4.0
-        yield f'<text class="angle" x="{LEFT - 5}" y="{y:.1f}" text-anchor="end">{tilt:g}°</text>'
+        yield drawing_text(f"{tilt:g}°", LEFT - 5.0, _up(tilt, top) + 4.0, "angle", anchor="end")
     for tick in TICKS:
         x, words = _across(tick), f"{tick}°".replace("-", "−")
         anchor = "end" if tick == TICKS[-1] else "middle"
-        place = f'x="{x:.1f}" y="{BOTTOM + 15}" text-anchor="{anchor}"'
-        yield f'<text class="angle" {place}>{words}</text>'
-        yield f'<path class="ring" d="M{x:.1f} {TOP}V{BOTTOM}"/>'
+        yield drawing_text(words, x, BOTTOM + 15.0, "angle", anchor=anchor)
+        yield _path("ring", f"M{x:.1f} {TOP}V{BOTTOM}")
 
 
-def _area(torsions: FloatArray, tilts: list[float | None], top: float) -> Iterator[str]:
+def _area(torsions: FloatArray, tilts: list[float | None], top: float) -> Iterator[Element]:
     """Yield the tilts as an area, with a gap where no tilt is possible."""
     ends = zip([*torsions.tolist(), 180.0], [*tilts, tilts[0]], strict=True)
     for is_possible, group in itertools.groupby(ends, lambda end: end[1] is not None):
         if not is_possible:
             continue
         points = [(_across(torsion), _up(tilt or 0.0, top)) for torsion, tilt in group]
-        outline = "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
-        first, last = points[0][0], points[-1][0]
-        yield (
-            f'<path class="possible" d="M{first:.1f} {BOTTOM}L{outline}L{last:.1f} {BOTTOM}Z"/>'
-            f'<path class="curve" d="M{outline}"/>'
-        )
+        corners = ((points[0][0], BOTTOM), *points, (points[-1][0], BOTTOM))
+        yield _path("possible", path_of(np.array(corners), decimals=1))
+        yield _path("curve", path_of(np.array(points), "", 1))
 
 
 def most_of(drawing: TiltsDrawing) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from html import escape
 from typing import get_args
+from xml.etree.ElementTree import Element
 
 import viser
 
@@ -21,6 +22,7 @@ from explorer.app.state.view import Gain, Ghost
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure, press_button
 from explorer.app.widgets.markup import box, caption, dim, margin_name, meter, swatch, ticks
+from explorer.export.drawings.markup import as_html, circle, element
 from explorer.measures.blocks import singularity as blocks
 from explorer.measures.blocks.block import Column, Facts, Statement, head_of
 from explorer.measures.blocks.source import pose_source
@@ -180,14 +182,18 @@ def fold_dial(frame: Frame, index: int) -> str:
         f"Fold {FOLDS[FIRST_FOLD + index]} at the {FOLD_LINES[index]}: {angle}; flat at 0° and "
         f"{'' if side > 0.0 else '−'}180°, with {INCIDENCES[index]}"
     )
-    return (
-        f'<span class="ex-dial" title="{escape(hint)}" '
-        f'style="--colour:{colours.css(colours.MARGIN_COLOURS[index])};--end:{colours.css(colours.SINGULAR)}">'
-        f'<svg viewBox="-20 {top:g} 40 {NEEDLE + 6.0:g}" aria-hidden="true">'
-        f'<path d="M{NEEDLE:g} 0A{NEEDLE:g} {NEEDLE:g} 0 0 {sweep} -{NEEDLE:g} 0Z"/>'
-        f'<circle cx="{NEEDLE:g}" r="2.5"/><circle cx="-{NEEDLE:g}" r="2.5"/>'
-        f'<path d="M0 0L{x:.2f} {y:.2f}"/></svg>{angle}</span>'
+    half = f"M{NEEDLE:g} 0A{NEEDLE:g} {NEEDLE:g} 0 0 {sweep} -{NEEDLE:g} 0Z"
+    drawing = element(
+        "svg",
+        element("path", d=half),
+        *(circle((end, 0.0), 2.5) for end in (NEEDLE, -NEEDLE)),
+        element("path", d=f"M0 0L{x:.2f} {y:.2f}"),
+        viewBox=f"-20 {top:g} 40 {NEEDLE + 6.0:g}",
+        aria_hidden="true",
     )
+    needle, ends = colours.css(colours.MARGIN_COLOURS[index]), colours.css(colours.SINGULAR)
+    style = f"--colour:{needle};--end:{ends}"
+    return as_html(element("span", drawing, angle, class_="ex-dial", title=hint, style=style))
 
 
 def distance_figure(frame: Frame) -> str:
@@ -342,19 +348,16 @@ def _top(dimension: int) -> int:
 @cache
 def _edges(here: Stratum) -> str:
     """Return the edges of the diagram as SVG; those down from a stratum are darker."""
-    lines: dict[bool, list[str]] = {False: [], True: []}
+    lines: dict[bool, list[Element]] = {False: [], True: []}
     for upper, lowers in strata.COVERED.items():
         for lower in lowers:
-            x1, x2 = (100.0 * (c + 0.5) / n for c, n in (_place(upper), _place(lower)))
+            x1, x2 = (f"{100.0 * (c + 0.5) / n:.4g}%" for c, n in map(_place, (upper, lower)))
             y1 = _top(strata.inversions(upper)) + NODE_HEIGHT
             y2 = _top(strata.inversions(lower))
-            line = f'<line x1="{x1:.4g}%" y1="{y1}" x2="{x2:.4g}%" y2="{y2}"/>'
-            lines[upper == here].append(line)
-    return (
-        '<svg class="ex-edges" stroke="currentColor">'
-        f'<g stroke-opacity="0.16">{"".join(lines[False])}</g>'
-        f'<g stroke-opacity="0.75" stroke-width="1.5">{"".join(lines[True])}</g></svg>'
-    )
+            lines[upper == here].append(element("line", x1=x1, y1=y1, x2=x2, y2=y2))
+    pale = element("g", *lines[False], stroke_opacity=0.16)
+    dark = element("g", *lines[True], stroke_opacity=0.75, stroke_width=1.5)
+    return as_html(element("svg", pale, dark, class_="ex-edges", stroke="currentColor"))
 
 
 SINGULARITY = Feature(

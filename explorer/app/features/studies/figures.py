@@ -12,12 +12,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import Literal
+from xml.etree.ElementTree import Element
 
 import msgspec
 import numpy as np
 
 from explorer.app.features.studies import state
 from explorer.app.widgets.markup import by_theme, reading
+from explorer.export.drawings.markup import element, page_picture
 from explorer.export.drawings.mechanism import round_length
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.number_text import Unit, format_number
@@ -341,7 +343,7 @@ def points_html(plotted: PlotRows) -> str:
     )
 
 
-def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[str]) -> str:
+def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[Element]) -> str:
     """Return the designs of a plot as SVG, over lines and boxes."""
     rows = plotted.rows[plot]
     places, picked = plotted.places(plot, rows), np.isin(rows, plotted.picked)
@@ -370,20 +372,22 @@ def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[st
         _path("picked", places[picked], PICKED),
         _path("core", places[picked]),
     ]
-    facts = msgspec.json.encode({"study": plotted.studies.name, "plot": plot}).decode()
-    words = f"Plot of {len(rows)} designs as {plot}"
-    return (
-        f'<svg viewBox="0 0 {SIDE} {SIDE}" preserveAspectRatio="none" role="img" '
-        f'aria-label="{words}" data-plot="{escape(facts)}">{"".join(pieces)}'
-        '<path class="near"/><rect class="drag"/></svg>'
+    return page_picture(
+        None,
+        f"Plot of {len(rows)} designs as {plot}",
+        *pieces,
+        element("path", class_="near"),
+        element("rect", class_="drag"),
+        viewBox=f"0 0 {SIDE} {SIDE}",
+        preserveAspectRatio="none",
+        data_plot=msgspec.json.encode({"study": plotted.studies.name, "plot": plot}).decode(),
     )
 
 
-def _path(look: str, places: FloatArray, colour: str = "") -> str:
-    if not places.size:
-        return ""
-    stroke = f' style="stroke:{colour}"' if colour else ""
-    return f'<path class="{look}"{stroke} d="{path_of(places)}"/>'
+def _path(look: str, places: FloatArray, colour: str = "") -> Element | None:
+    style = f"stroke:{colour}" if colour else None
+    data = path_of(places)
+    return element("path", class_=look or None, style=style, d=data) if data else None
 
 
 def _ranges(plotted: PlotRows, name: str) -> list[state.Range]:
@@ -393,11 +397,11 @@ def _ranges(plotted: PlotRows, name: str) -> list[state.Range]:
     return list(zip(low, high, strict=True))
 
 
-def _box(x: state.Range, y: state.Range) -> str:
+def _box(x: state.Range, y: state.Range) -> Element:
     """Return the box of a brush, from its ends on both axes."""
     left, right, top, bottom = (round(SIDE * each) for each in (*x, 1.0 - y[1], 1.0 - y[0]))
-    size = f'width="{right - left}" height="{bottom - top}"'
-    return f'<rect class="brush" x="{left}" y="{top}" {size}/>'
+    sides = {"width": right - left, "height": bottom - top}
+    return element("rect", class_="brush", x=left, y=top, **sides)
 
 
 def _values(look: str, side: str, places: FloatArray, values: FloatArray) -> str:
