@@ -19,8 +19,7 @@ from explorer.legs.clearance import PAIRS, leg_axes, pair_rows
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.motion.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
-from explorer.workspace.limits.constraints import constraints
-from explorer.workspace.limits.region import region_of
+from explorer.workspace.workspace import Workspace
 
 CLEARANCE = 0.2
 """Clearance between parts that move against each other."""
@@ -44,13 +43,13 @@ _WALL, _SWING, _EYE, _PIN, _NECK, _OVERLAP, _SHAFT = 0.3, 2.6, 1.1, 0.45, 0.45, 
 _RIM = 0.5
 
 
-class StrokeRange(NamedTuple):
+class Stroke(NamedTuple):
     """The shortest and the longest length of an actuator."""
 
     shortest: float
     longest: float
 
-    def covers(self, required: StrokeRange) -> bool:
+    def covers(self, required: Stroke) -> bool:
         """Whether it covers a required stroke, but for the last bits."""
         slack = SLACK * required.longest
         return (
@@ -100,7 +99,7 @@ class LegSizes:
         """Return the distance from its joint within which a leaning leg is below a height."""
         return height * math.tan(FIRST_SWING) + self.outer / math.cos(FIRST_SWING)
 
-    def stroke(self, required: StrokeRange, home_length: float) -> StrokeRange:
+    def stroke(self, required: Stroke, home_length: float) -> Stroke:
         """Return the required stroke, or the part of it that a single rod covers.
 
         A rod no longer than its cylinder can at most double the length of a leg. Of a longer stroke
@@ -110,7 +109,7 @@ class LegSizes:
             required.shortest,
             min((2.0 * home_length + self.dead) / 3.0, 0.5 * (required.longest + self.dead)),
         )
-        return StrokeRange(shortest, min(required.longest, 2.0 * shortest - self.dead))
+        return Stroke(shortest, min(required.longest, 2.0 * shortest - self.dead))
 
 
 class GuideSizes:
@@ -190,10 +189,10 @@ class Sizes:
         """Return the coordinate of a leg's carriage on the guide in the home pose."""
         return float(joints_of_leg(self.home_joints, leg)[0]) * self.design.unit_mm
 
-    def required_stroke(self, leg: int) -> StrokeRange:
+    def required_stroke(self, leg: int) -> Stroke:
         """Return the stroke that the limits of a leg allow."""
         low, high = self.design.length_range(LENGTHS[leg - 1])
-        return StrokeRange(low * self.design.unit_mm, high * self.design.unit_mm)
+        return Stroke(low * self.design.unit_mm, high * self.design.unit_mm)
 
     def nearest_to_a1(self, leg: int) -> float:
         """Return the least distance of a leg's carriage from a1; a pillar stands between."""
@@ -201,13 +200,13 @@ class Sizes:
         return sweep + 2.0 * CLEARANCE + self.guide.pillar + self.radii[leg - 1]
 
     @cached_property
-    def carriage_ranges(self) -> Mapping[int, StrokeRange]:
+    def carriage_ranges(self) -> Mapping[int, Stroke]:
         """The ranges of the carriages along the guide, by their legs.
 
         A range is that of the guide's limits or, without such limits, the range that the
         workspace needs, on the carriage's side of a1.
         """
-        ranges: dict[int, StrokeRange] = {}
+        ranges: dict[int, Stroke] = {}
         for leg in ON_GUIDE:
             home, nearest = self.carriage_at_home(leg), self.nearest_to_a1(leg)
             low, high = self._required_guide_range(leg)
@@ -215,23 +214,23 @@ class Sizes:
                 low = max(low, nearest)
             else:
                 high = min(high, -nearest)
-            ranges[leg] = StrokeRange(min(low, home), max(high, home))
+            ranges[leg] = Stroke(min(low, home), max(high, home))
         return ranges
 
-    def _required_guide_range(self, leg: int) -> StrokeRange:
+    def _required_guide_range(self, leg: int) -> Stroke:
         design, home = self.design, self.design.home_pose
         if design.limits.guide is not None:
             low, high = design.limits.guide
-            return StrokeRange(low * design.unit_mm, high * design.unit_mm)
-        region = region_of(constraints(design, home.rotation))
+            return Stroke(low * design.unit_mm, high * design.unit_mm)
+        region = Workspace(design).region
         shift = float(home.rotation[0, 0]) * (design.b2 if leg == 2 else design.b3)
         low, high = region.low, region.high
         if region.is_flat or not low < high:
             low = high = home.position[0]
-        return StrokeRange((low + shift) * design.unit_mm, (high + shift) * design.unit_mm)
+        return Stroke((low + shift) * design.unit_mm, (high + shift) * design.unit_mm)
 
     @cached_property
-    def rails(self) -> tuple[StrokeRange, ...]:
+    def rails(self) -> tuple[Stroke, ...]:
         """The ends of the shaft, or of two shafts if a1 is between the carriages."""
         ends_by_side: dict[bool, list[float]] = {}
         for leg in ON_GUIDE:
@@ -240,7 +239,7 @@ class Sizes:
             ends_by_side.setdefault(self.carriage_at_home(leg) > 0.0, []).extend(
                 (low - overhang, high + overhang)
             )
-        return tuple(StrokeRange(min(ends), max(ends)) for ends in ends_by_side.values())
+        return tuple(Stroke(min(ends), max(ends)) for ends in ends_by_side.values())
 
     def leg_distances(
         self, position: ArrayLike, rotation: ArrayLike

@@ -116,9 +116,8 @@ class Forces(LoadOptions):
 def _forces_json(
     found: loaded.LoadedPose, worst: forces.WorstDirection, added: loaded.WorstForce | None
 ) -> dict[str, object]:
-    reactions, by_unit = found.reactions, found.unit_force.utilisation
-    share = float(worst.utilisation)
-    is_limiting = added is not None and added.utilisation > 0.0
+    reactions, share, by_unit = found.reactions, float(worst.share), found.unit_force.share
+    is_limiting = added is not None and added.share > 0.0
     return {
         "actuator_forces": reactions.actuators,
         "strut_bending": reactions.bending,
@@ -137,7 +136,7 @@ def _forces_json(
         and {
             "direction": added.direction if is_limiting else None,
             "part": LIMITED[added.part] if is_limiting else None,
-            "share": added.utilisation,
+            "share": added.share,
         },
     }
 

@@ -228,7 +228,7 @@ class DesignsPanel:
             "Name",
             "Name of the live design, under which it is saved.",
             Bound(lambda frame: frame.state.design.name, lambda _, name: SetName(name)),
-            disabled=lambda state: bool(state.busy),
+            disabled=lambda state: state.optimisation.is_on,
         )
         actions: dict[str, Callable[[Who], None]] = {
             "Save": lambda who: saved.save(session.latest_state().design, who),
