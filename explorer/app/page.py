@@ -161,15 +161,11 @@ class Page:
             user_data,
             tour,
             self.autosaver,
-            lambda: self.palette.commands,
+            FEATURES,
+            {} if studies is None else {study_folders: studies},
         )
-        if studies is not None:
-            self.services.give(study_folders, studies)
-        self.services.at_end(self.services.downloads.stop)
         server.scene.set_up_direction("+z")
-        self._features = tuple(each for each in FEATURES if each.is_offered(self.services))
-        self.services.exports = tuple(each for one in self._features for each in one.exports)
-        self.services.openers = {k: v for one in self._features for k, v in one.openers.items()}
+        self._features = self.services.features
         self._scene = [self.services.get(part) for each in self._features for part in each.scene]
         # The worker computes in the order of their requests. The scene alone needs those feeds
         # only of which it draws.
@@ -217,6 +213,7 @@ class Page:
         self.buttons.stop()
         self.session.stop()
         self.services.stop()
+        self.services.downloads.stop()
         if self.autosaver is not None:
             self.autosaver.stop()
         self.worker.stop()
@@ -229,8 +226,7 @@ class Page:
     def _add_panels(self) -> list[Panel]:
         panels: list[Panel] = [Bar(self.services, self._features)]
         for feature, tab in ((each, tab) for each in self._features for tab in each.tabs):
-            self.services.tab = self.panels.tab(tab, feature.manual)
-            with self.services.tab:
+            with self.panels.tab(tab, feature.manual), self.services.commands.within(tab.title):
                 panels.append(self.services.get(tab.panel))
         return panels
 
@@ -238,10 +234,12 @@ class Page:
         reset = Command(
             "View › Reset layout", "Put the panels where they were at first.", layout.reset
         )
-        commands = [each.of(self.session) for one in self._features for each in one.commands]
-        keys = {name: each for one in self._features for name, each in one.keys.items()}
-        lists = {label for feature in self._features for label in feature.lists}
-        return Palette(self._server, (*self.buttons.commands, reset, *commands), keys, lists)
+        for command in (
+            reset,
+            *(each.of(self.session) for one in self._features for each in one.commands),
+        ):
+            self.services.commands.add(command)
+        return Palette(self._server, self.services.commands.all)
 
     def _draw(self, frame: Frame) -> None:
         if not self._is_complete:

@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 
 import viser
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Feature, Services
 from explorer.app.session.session import Session, Who
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.downloads import Downloads, File
 from explorer.page.session.worker import Worker
+from explorer.page.widgets.palette import Commands
 
 
 def _ignore(message: str, who: Who) -> None:
@@ -116,6 +117,7 @@ def services_for(
     tell: Callable[[str], None] = lambda _: None,
     redraw: Callable[[], None] = lambda: None,
     user_data: UserData | None = None,
+    declared: tuple[Feature, ...] = (),
 ) -> Services:
     """Return services for what needs only some of them; the others are missing.
 
@@ -128,17 +130,19 @@ def services_for(
         tell: Called with a message for everybody.
         redraw: Called in place of the redraw of a session that is missing.
         user_data: The user's designs and session.
+        declared: The features of the page.
     """
     working = StubWorker() if worker is None else worker
     some_server: Any = server
     some_session: Any = SimpleNamespace(redraw=redraw) if session is None else session
     missing: Any = None
+    no_buttons: Any = SimpleNamespace(commands=Commands())
     no_theme: Any = SimpleNamespace(paint=_paint_nothing)
     return Services(
         server=some_server,
         session=some_session,
         worker=working,
-        buttons=missing if buttons is None else buttons,
+        buttons=no_buttons if buttons is None else buttons,
         downloads=StubDownloads(some_server, working),
         complain=complain,
         tell=tell,
@@ -146,6 +150,7 @@ def services_for(
         cameras=missing,
         user_data=user_data,
         offers_tour=False,
+        declared=declared,
     )
 
 

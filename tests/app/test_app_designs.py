@@ -42,6 +42,7 @@ def services(
         buttons=buttons,
         complain=desk.complain,
         user_data=UserData(library, SessionFile()),
+        declared=(HISTORY,),
     )
     yield services
     services.stop()
@@ -162,7 +163,6 @@ def test_upload_is_read_strictly_and_its_name_is_no_path(
     changed = desk.state.design
     session = encode_session(desk.session.history)
     desk.session.do(Open(OPTIMAL))
-    services.openers = HISTORY.openers
     for encoding in ("utf-8", "utf-8-sig", "utf-16"):
         saved.take(session.decode().encode(encoding), "left.json")
         settle(desk, saved)

@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 import pytest
 from desk import Desk
+from page_widgets import widgets
 from services import StubDownloads, StubWorker, services_for
 
 from explorer.app.features.feature import Services
@@ -69,7 +70,6 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS
 from explorer.page.widgets.assigning import Assigner
-from explorer.page.widgets.palette import widgets
 from explorer.paths.loads import path_loads
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid

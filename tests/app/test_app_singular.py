@@ -404,7 +404,7 @@ def test_press_on_a_row_goes_to_its_mode_and_one_in_the_head_switches_the_ghosts
     for on in (True, False):
         desk.press(services.buttons, "modes.ghosts")
         assert desk.state.view.ghosts is on
-    labels = [command.label for command in services.buttons.commands]
+    labels = [command.label for command in services.commands.all]
     assert "Pose › Assembly mode › 3: − + +" in labels
     assert len(labels) == len(modes.MODES) + 1
 

@@ -741,7 +741,7 @@ def test_study_that_cannot_be_is_refused_and_leaves_nothing(studio: Studio) -> N
 def test_new_study_closes_the_open_one_and_shows_the_settings(
     services: Services, desk: Desk, buttons: Buttons, home: Path
 ) -> None:
-    services.give(study_folders, StudyFolders(home))
+    services.shared[study_folders] = StudyFolders(home)
     panel = StudiesPanel(services)
     desk.session.do(OpenStudy("some"))
     draw_study(panel.feed, Studies.of(desk.state))

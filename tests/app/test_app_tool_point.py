@@ -17,6 +17,7 @@ import trimesh
 import viser
 from desk import Desk, ScriptedBrowser, by_name, number, rows_of
 from hypothesis import given, strategies as st
+from page_widgets import widgets
 from services import StubDownloads, StubWorker
 from strategies import Case, all_cases
 from workspace_feeds import draw
@@ -70,7 +71,6 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Assigner
-from explorer.page.widgets.palette import widgets
 from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal, Protocol, TypeVar
 
 import viser
@@ -28,7 +29,7 @@ from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
 from explorer.measures.blocks.source import Source
 from explorer.page.session.worker import Worker
 from explorer.page.widgets.assigning import Updates
-from explorer.page.widgets.palette import Command, Key
+from explorer.page.widgets.palette import Command, Commands, Key
 
 Place = Literal["build", "analyse", "work", "dialog"]
 Side = Literal["left", "middle", "right"]
@@ -39,7 +40,7 @@ Opener = Callable[["Services", bytes, str], tuple[Action, str]]
 """Returns the action that opens a file by its content and name, and a sentence on what it is."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Services:
     """The services that the page offers to its features.
 
@@ -56,9 +57,8 @@ class Services:
         user_data: The user's designs and session; None to save nothing.
         offers_tour: Whether the tour begins by itself in browsers that have not seen it.
         autosaver: Saver of the session; None to save nothing.
-        commands: Function that returns the commands of the palette.
-        exports: The files that the features of the page offer.
-        tab: Tab whose panels are being made.
+        declared: The features, of which the page may lack some.
+        shared: The objects that the features share, by the functions that make them, see `get`.
     """
 
     server: viser.ViserServer
@@ -73,11 +73,8 @@ class Services:
     user_data: UserData | None
     offers_tour: bool
     autosaver: Autosaver | None = None
-    commands: Callable[[], tuple[Command, ...]] = tuple
-    exports: tuple[Export, ...] = ()
-    openers: Mapping[str, Opener] = field(default_factory=dict[str, Opener])
-    tab: viser.GuiTabHandle | None = None
-    _shared: dict[object, Any] = field(default_factory=dict[object, Any])
+    declared: tuple[Feature, ...] = ()
+    shared: dict[object, Any] = field(default_factory=dict[object, Any])
     _ends: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
 
     @property
@@ -90,19 +87,25 @@ class Services:
         """The API that adds parts of the scene."""
         return self.server.scene
 
+    @property
+    def commands(self) -> Commands:
+        """The commands of the page."""
+        return self.buttons.commands
+
+    @cached_property
+    def features(self) -> tuple[Feature, ...]:
+        """The features that the page has."""
+        return tuple(each for each in self.declared if each.is_offered(self))
+
     def get(self, kind: Callable[[Services], Shared]) -> Shared:
         """Return the one object of a class that the features share, made at the first call."""
-        if kind not in self._shared:
-            self._shared[kind] = kind(self)
-        return self._shared[kind]
-
-    def give(self, kind: Callable[[Services], Shared], value: Shared) -> None:
-        """Share an object that the page has already as the one of its class."""
-        self._shared[kind] = value
+        if kind not in self.shared:
+            self.shared[kind] = kind(self)
+        return self.shared[kind]
 
     def has(self, kind: Callable[[Services], object]) -> bool:
         """Whether the one object of a class has been made."""
-        return kind in self._shared
+        return kind in self.shared
 
     def at_end(self, stop: Callable[[], None]) -> None:
         """Register a function that is called when the page ends."""
@@ -348,9 +351,6 @@ class Feature:
         commands: Commands that have no control.
         passing: Function that returns the commands that come and go, such as those that open a
             saved design; the same object while they stay.
-        keys: Keys of its controls, by the names of their commands; buttons in markup and `commands`
-            have theirs.
-        lists: Labels of the lists whose every option is a command.
         floor: Function that returns the lowest height, in design units, of what is drawn in place
             of the schematic mechanism; None while that is drawn itself.
         is_offered: Function that tells whether the page has the feature.
@@ -369,7 +369,5 @@ class Feature:
     tasks: tuple[Callable[..., object], ...] = ()
     commands: tuple[StateCommand, ...] = ()
     passing: Callable[[Services], tuple[Command, ...]] | None = None
-    keys: Mapping[str, tuple[Key, ...]] = field(default_factory=dict[str, tuple[Key, ...]])
-    lists: tuple[str, ...] = ()
     floor: Callable[[Services], float | None] | None = None
     is_offered: Callable[[Services], bool] = lambda _: True

@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, Literal, TypeAlias, TypedDict, TypeVar, Unpack, cast
+from functools import partial
+from typing import Any, Generic, Literal, Protocol, TypeAlias, TypedDict, TypeVar, Unpack, cast
 
 import viser
 
@@ -36,6 +37,7 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import snap_to_decimals
 from explorer.page.browser.viser_gaps import MARKS, slider_marks
 from explorer.page.widgets.assigning import Update
+from explorer.page.widgets.palette import NO_OPTION, Key, WithCommands
 
 # Colour of viser by which the stylesheet tells the main button of a tab from the others.
 MAIN: Literal["blue"] = "blue"
@@ -189,6 +191,10 @@ class Control(Generic[Value]):
             stamp = self.handle.update_timestamp
             self.session.post(self, self._change, stamp=stamp, who=event.client_id)
 
+    def use(self, value: Value, client: viser.ClientHandle) -> None:
+        """Set another value, as a command of a client does."""
+        self.session.post(self, lambda state: self.bound.write(state, value), who=client.client_id)
+
     def _change(self, state: State) -> Action | None:
         self._last_value = self.handle.value
         self._is_set_here = True
@@ -269,6 +275,15 @@ class Conditions(TypedDict, total=False):
     visible: Condition | None
 
 
+class WithControls(WithCommands, Protocol):
+    """A page whose controls post to a session."""
+
+    @property
+    def session(self) -> Session:
+        """The session."""
+        ...
+
+
 class Controls:
     """Makes controls and keeps them in step with the state.
 
@@ -277,13 +292,11 @@ class Controls:
     binds a control to a value that is not plain.
 
     Args:
-        gui: Controls of the page, added in the order of the calls.
-        session: Session to which they post.
+        page: The page, to which the controls are added in the order of the calls.
     """
 
-    def __init__(self, gui: viser.GuiApi, session: Session) -> None:
-        self._gui = gui
-        self._session = session
+    def __init__(self, page: WithControls) -> None:
+        self._gui, self._session, self._commands = page.gui, page.session, page.commands
         self._controls: list[Control[Any]] = []
         # Folders and controls with the words that name them, and the power of length of their unit.
         self._labels: list[tuple[Any, str, int]] = []
@@ -415,11 +428,20 @@ class Controls:
         self._bind(handle, bound, _step_in_unit(step, power) if power else None, **conditions)
 
     def checkbox(
-        self, label: str, hint: str, at: Source[bool], **conditions: Unpack[Conditions]
+        self,
+        label: str,
+        hint: str,
+        at: Source[bool],
+        *,
+        keys: tuple[Key, ...] = (),
+        **conditions: Unpack[Conditions],
     ) -> None:
-        """Add a checkbox."""
+        """Add a checkbox, and its command, which may have keys."""
         handle = self._gui.add_checkbox(label, initial_value=False, hint=hint)
-        self._bind(handle, bound_to(at, label), **conditions)
+        control = self._bind(handle, bound_to(at, label), **conditions)
+        self._commands.offer(
+            handle, lambda client: control.use(not handle.value, client), keys=keys
+        )
 
     def dropdown(
         self,
@@ -427,6 +449,8 @@ class Controls:
         hint: str,
         options: Mapping[str, object] | tuple[str, ...],
         at: Source[str],
+        *,
+        is_in_palette: bool = False,
         **conditions: Unpack[Conditions],
     ) -> None:
         """Add a list to choose from.
@@ -436,11 +460,14 @@ class Controls:
             hint: Sentence on what it chooses.
             options: Words of the options, with their values if `at` is a path.
             at: Source of its value.
+            is_in_palette: Whether every option is a command.
             conditions: In which states it is disabled and visible.
         """
         handle = self._gui.add_dropdown(label, tuple(options), hint=hint)
         values = options if isinstance(options, Mapping) else {text: text for text in options}
-        self._bind(handle, bound_to(at, label, values), **conditions)
+        control = self._bind(handle, bound_to(at, label, values), **conditions)
+        for option in [each for each in options if is_in_palette and each != NO_OPTION]:
+            self._commands.offer(handle, partial(control.use, option), option=option)
 
     def text(
         self, label: str, hint: str, at: Source[str], **conditions: Unpack[Conditions]
@@ -457,6 +484,7 @@ class Controls:
         *,
         icon: viser.IconName | None = None,
         main: bool = False,
+        keys: tuple[Key, ...] = (),
     ) -> viser.GuiButtonHandle:
         """Add a button that does an action.
 
@@ -466,6 +494,7 @@ class Controls:
             action: Function that returns the action.
             icon: Icon before the words.
             main: Whether it is the one filled button of its tab.
+            keys: Keys of its command.
         """
         handle = self._gui.add_button(label, hint=hint, icon=icon, color=MAIN if main else None)
 
@@ -473,6 +502,9 @@ class Controls:
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             self._session.do(action(), who=event.client_id)
 
+        self._commands.offer(
+            handle, lambda client: self._session.do(action(), who=client.client_id), keys=keys
+        )
         return handle
 
     def _bound(
@@ -491,9 +523,11 @@ class Controls:
         bound: Bound[Value],
         step: Callable[[State], float] | None = None,
         **conditions: Unpack[Conditions],
-    ) -> None:
+    ) -> Control[Value]:
         """Bind an input that has no range to the state."""
-        self._controls.append(Control(self._session, handle, bound, step=step, **conditions))
+        control = Control(self._session, handle, bound, step=step, **conditions)
+        self._controls.append(control)
+        return control
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make every control show the frame."""

@@ -23,7 +23,7 @@ from explorer.measures.blocks.source import Source
 from explorer.page.browser.browser_facts import decode_text
 from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.page.look import read_script
-from explorer.page.widgets.palette import STEP, Command, Key
+from explorer.page.widgets.palette import STEP, Command, Commands, Key
 
 MANUAL = "help.open"
 """The name of buttons that open the manual; the value is a page, with "#" and a heading or term."""
@@ -50,12 +50,12 @@ class Buttons:
         server: The server whose browsers show the page.
 
     Attributes:
-        commands: The commands that press a button, for the palette.
+        commands: The commands of the page; those that press a button are among them.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._registered: dict[str, tuple[PressHandler, Container[str] | None]] = {}
-        self.commands: list[Command] = []
+        self.commands = Commands()
         # Handles presses one after the other, in their order.
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="buttons")
         self.inbox = server.gui.add_text("Presses on markup", "", visible=False)
@@ -108,7 +108,7 @@ class Buttons:
         def run(client: viser.ClientHandle) -> None:
             self.press(name, value, client)
 
-        self.commands.append(Command(label, hint, run, is_ready, keys=keys))
+        self.commands.add(Command(label, hint, run, is_ready, keys=keys))
 
     def receive(self, text: str, client: viser.ClientHandle) -> None:
         """Queue a press that a page sent; drop a text that describes none."""

@@ -11,6 +11,7 @@ from explorer.app.session.feed import Feed
 from explorer.app.widgets.markup import alert
 from explorer.numerics.number_text import format_decimals
 from explorer.page.widgets.assigning import Update
+from explorer.page.widgets.palette import WithCommands
 
 AnyFeed = Feed[Any, Any]
 
@@ -21,8 +22,8 @@ class UnderWay:
     The drawing has a name, such as "workspace".
     """
 
-    def __init__(self, gui: viser.GuiApi, what: str, feed: AnyFeed) -> None:
-        self._feed = feed
+    def __init__(self, page: WithCommands, what: str, feed: AnyFeed) -> None:
+        gui, self._feed = page.gui, feed
         self._cancel = gui.add_button(
             f"Stop computing the {what}",
             icon=viser.Icon.PLAYER_STOP,
@@ -35,8 +36,9 @@ class UnderWay:
             hint=f"Compute the {what} again after it was stopped.",
             visible=False,
         )
-        self._cancel.on_click(lambda _: feed.cancel())
-        self._retry.on_click(lambda _: feed.retry())
+        for button, act in ((self._cancel, feed.cancel), (self._retry, feed.retry)):
+            button.on_click(lambda _, act=act: act())
+            page.commands.offer(button, lambda _, act=act: act())
 
     def updates(self) -> Iterator[Update]:
         """Yield the updates that show the buttons that have an effect."""

@@ -31,7 +31,7 @@ from explorer.page.browser.viser_gaps import element_id, run_script, run_script_
 from explorer.page.look import call_script, read_script
 from explorer.page.session.latest import LatestWins
 from explorer.page.widgets.assigning import Update
-from explorer.page.widgets.palette import Command
+from explorer.page.widgets.palette import Command, Run
 
 # Byte order marks, the zeros of UTF-16, and blanks.
 BEFORE_JSON = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
@@ -124,7 +124,8 @@ class SavedDesigns:
         def work() -> None:
             if not data.lstrip(BEFORE_JSON).startswith(b"{"):
                 raise InputError(f"{name} is no design, study or session; these are JSON files")
-            openers, fields = self._services.openers, field_names(data)
+            openers = {k: v for one in self._services.features for k, v in one.openers.items()}
+            fields = field_names(data)
             opener = next((openers[each] for each in openers if each in fields), open_design)
             action, words = opener(self._services, data, name)
             before = self._session.latest_state()
@@ -223,7 +224,7 @@ class DesignsPanel:
         gui, session, buttons = services.gui, services.session, services.buttons
         self._session = session
         self._saved = saved = services.get(SavedDesigns)
-        self._controls = Controls(gui, session)
+        self._controls = Controls(services)
         self._controls.text(
             "Name",
             "Name of the live design, under which it is saved.",
@@ -243,6 +244,8 @@ class DesignsPanel:
             "or download it as a file. A design that is replaced can be brought back.",
         )
         self._buttons.on_click(lambda event: actions[self._buttons.value](event.client_id))
+        for option, act in actions.items():
+            services.commands.offer(self._buttons, _run(act), option=option)
         self.status = gui.add_html("")
         upload = gui.add_upload_button(
             "Open a file …",
@@ -270,6 +273,7 @@ class DesignsPanel:
             visible=False,
         )
         self.restore.on_click(lambda event: saved.restore(event.client_id))
+        services.commands.offer(self.restore, _run(saved.restore))
         buttons.on("designs.open", self._for_row(self._open))
         buttons.on("designs.duplicate", self._for_row(self._duplicate))
         buttons.on("designs.delete", self._for_row(lambda row, _: self._set_asked(row.name)))
@@ -383,6 +387,11 @@ def _line(row: Entry, view: View, *, is_current: bool, is_asked: bool) -> str:
 def _link(act: str, name: str, words: str) -> str:
     hint = f"{words} {name}"
     return press_button(f"designs.{act}", name, words, hint=hint, label=hint, class_name="ex-link")
+
+
+def _run(act: Callable[[Who], None]) -> Run:
+    """Return the function that runs a command for a client by its id."""
+    return lambda client: act(client.client_id)
 
 
 DESIGNS = Feature(

@@ -79,7 +79,7 @@ class HelpDialog:
 
     def updates(self, _: Frame) -> Updates:
         """Yield the markup with the keys, which are known once all features are made."""
-        self._markup = self._markup or box(self._rows + keys_table(self._services.commands()))
+        self._markup = self._markup or box(self._rows + keys_table(self._services.commands.all))
         yield self._html, "content", self._markup
 
 

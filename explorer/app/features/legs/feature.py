@@ -71,7 +71,7 @@ class ClearancePanel:
             "Workspace › Clearance",
             lambda state: pose_source("interference", state.design, state.pose),
         )
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
         with gui.add_folder("Clearance"):
             self._pose = gui.add_html("")
             controls.checkbox(
@@ -99,7 +99,7 @@ class ClearancePanel:
             )
             self._words = gui.add_html("", visible=False)
             self._feed = services.get(RADIUS_FEED)
-            self._under_way = UnderWay(gui, "curve", self._feed)
+            self._under_way = UnderWay(services, "curve", self._feed)
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""

@@ -46,7 +46,7 @@ class ForcesPanel:
         gui = services.gui
         self._loads = services.get(load.Loads)
         self._nearest = services.get(load.nearest_feed)
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
         self._top = gui.add_html("")
         with gui.add_folder("Load at the tool (axes of the base)"):
             controls.triple(
@@ -71,6 +71,7 @@ class ForcesPanel:
                 "also the platform and the legs, as parts of the prototype.",
                 get_args(Weighed),
                 "view.forces.weighed",
+                is_in_palette=True,
             )
             controls.checkbox(
                 "Forces in the scene",
@@ -210,5 +211,4 @@ LOADS = Feature(
     scene=(ForcesScene, LoadHandle, ErrorEllipsoidScene, DeflectedScene),
     later_feeds=(load.WEIGHTS_FEED, load.nearest_feed, precision.BUDGET_FEED),
     tasks=(load.weights_of_parts, load.nearest_position, budget.budget_of, budget.budget_table),
-    lists=("Weights", "Worst over"),
 )

@@ -71,7 +71,7 @@ class PrecisionPanel:
     def __init__(self, services: Services) -> None:
         gui, self._loads = services.gui, services.get(Loads)
         self._feed = services.get(BUDGET_FEED)
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
         with gui.add_folder("Precision"):
             self._top = gui.add_html("")
             controls.checkbox(
@@ -101,7 +101,9 @@ class PrecisionPanel:
                 "tool.",
                 "view.precision.budget",
             )
-            controls.dropdown("Worst over", OVER_HINT, OVER, "view.precision.over")
+            controls.dropdown(
+                "Worst over", OVER_HINT, OVER, "view.precision.over", is_in_palette=True
+            )
             controls.number(
                 "Wanted within ± (mm)",
                 "Largest displacement of the tool that is wanted: tolerances of the least total "

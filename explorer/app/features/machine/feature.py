@@ -84,7 +84,7 @@ class MachinePanel:
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        self._controls = controls = MachineControls(gui, services.session)
+        self._controls = controls = MachineControls(services)
         # Moments of inertia that are being typed, and the payload that cannot have them.
         self._typed: tuple[Payload, Triple] | None = None
         self._summary = gui.add_html("")
@@ -185,6 +185,7 @@ class MachinePanel:
                     "design.gravity", DIRECTIONS.get(name, state.design.gravity), "Gravity", name
                 ),
             ),
+            is_in_palette=True,
         )
         self._controls.triple(
             "Direction",
@@ -405,5 +406,4 @@ MACHINE = Feature(
     manual="loads.md#The tab Machine",
     tabs=(Tab("build", "Machine", MachinePanel, viser.Icon.CRANE),),
     scene=(ToolScene, PayloadScene),
-    lists=("Gravity",),
 )

@@ -87,7 +87,7 @@ class MovePanel:
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
 
         def is_point(state: State, at: str) -> bool:
             return at == "b4" or any(state.design.tool.position)
@@ -134,12 +134,14 @@ class MovePanel:
                 actions.UseNearest,
                 icon=viser.Icon.MAGNET,
                 main=True,
+                keys=(Key("U"),),
             )
             controls.button(
                 "Home pose",
                 "Return to the home pose, with which the design opens.",
                 actions.GoHome,
                 icon=viser.Icon.HOME,
+                keys=(Key("H"),),
             )
         self._modes = ModesPanel(services)
 
@@ -212,7 +214,7 @@ class DesignPanel:
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
         with gui.add_folder("Design"):
             controls.dropdown(
                 "Preset",
@@ -223,12 +225,14 @@ class DesignPanel:
                     lambda frame: preset_of(frame.state.design) or NO_OPTION,
                     lambda state, name: open_geometry(PRESETS.get(name, state.design), state),
                 ),
+                is_in_palette=True,
             )
             controls.dropdown(
                 "On a change",
                 "What a change of the design keeps: the pose, or the lengths of the legs.",
                 HOLDS,
                 "hold",
+                is_in_palette=True,
             )
             controls.button(
                 "Reset",
@@ -262,6 +266,7 @@ class DesignPanel:
                 "Unit in which lengths are shown and typed, here and everywhere on the page.",
                 get_args(LengthName),
                 "view.lengths",
+                is_in_palette=True,
             )
         with controls.folder("Limits ({unit})", is_open=False):
             self._add_limits(in_degrees=False)
@@ -345,9 +350,4 @@ MECHANISM = Feature(
             keys=(shift("N"),),
         ),
     ),
-    keys={
-        "Pose › Home pose": (Key("H"),),
-        "Pose › Use the nearest length": (Key("U"),),
-    },
-    lists=("Preset", "On a change", "Lengths in"),
 )

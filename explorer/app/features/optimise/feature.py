@@ -71,11 +71,13 @@ class OptimisePanel:
     def __init__(self, services: Services) -> None:
         gui = services.gui
         add_buttons(services)
-        self._controls = Controls(gui, services.session)
+        self._controls = Controls(services)
         gui.add_html(COLUMNS)
         with gui.add_folder("Problem"):
             self._add_problem()
-            with gui.add_folder("Free variables", expand_by_default=False):
+            title = "Free variables"
+            folder = gui.add_folder(title, expand_by_default=False)
+            with folder, services.commands.within(title):
                 for name, hint in FREE.items():
                     self._add_free(name, hint)
         self._result, self._verdict = gui.add_html(""), services.get(BuildVerdict)
@@ -94,6 +96,7 @@ class OptimisePanel:
             "The measure that the search improves.",
             OBJECTIVES,
             At("optimisation.request.objective", action=SetObjective),
+            is_in_palette=True,
         )
         self._add_number(
             "volume",
@@ -356,5 +359,4 @@ OPTIMISE = Feature(
     bar=(InBar("right", lambda _: search_chip),),
     scene=(RequiredBox,),
     runners=(Optimiser,),
-    lists=("Objective",),
 )

@@ -72,7 +72,7 @@ class OrientationPanel:
         gui = services.gui
         self._here = services.get(work.POSITION_FEED)
         self._tilts, self._ranges = services.get(work.TILTS_FEED), services.get(work.RANGE_FEED)
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
         self._top = gui.add_html("")
         self._map = gui.add_html("")
         self._legend = gui.add_html("")
@@ -93,13 +93,14 @@ class OrientationPanel:
                 "view.orientation.tilts",
             )
             self._scale = gui.add_html("", visible=False)
-            self._tilts_under_way = UnderWay(gui, "tilts", self._tilts)
+            self._tilts_under_way = UnderWay(services, "tilts", self._tilts)
             controls.dropdown(
                 "Solid over tilts",
                 "Draw the positions that allow at least one (inclusive workspace) or all (total "
                 "workspace) of the orientations within a tilt and a turn from that of home.",
                 OVER,
                 "view.orientation.over",
+                is_in_palette=True,
             )
             controls.number(
                 "Tilts from home up to (°)",
@@ -298,5 +299,4 @@ ORIENTATION = Feature(
     scene=(OrientationScene,),
     later_feeds=(work.POSITION_FEED, work.TILTS_FEED, work.RANGE_FEED),
     tasks=(work.orientations_at, work.tilts_at_nodes, work.range_solid),
-    lists=("Solid over tilts",),
 )

@@ -181,5 +181,4 @@ PATHS = Feature(
         ),
     ),
     tasks=(draw_drives,),
-    keys={"Paths › Go": (Key("J"),)},
 )

@@ -33,6 +33,7 @@ from explorer.numerics.number_text import (
     snap_to_decimals,
 )
 from explorer.page.widgets.assigning import Updates
+from explorer.page.widgets.palette import Key
 
 EndName = Literal["start", "goal"]
 ENDS: tuple[EndName, ...] = ("start", "goal")
@@ -73,7 +74,7 @@ class PathsPanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._downloads, self._controls = services.downloads, Controls(gui, services.session)
+        self._downloads, self._controls = services.downloads, Controls(services)
         kinds = {
             kind: Chip(words, f"Paths › {words}", hint, choose("paths.kind", kind, "Path"))
             for kind, (words, hint) in KINDS.items()
@@ -100,6 +101,7 @@ class PathsPanel:
                 actions.Go,
                 icon=viser.Icon.ROUTE,
                 main=True,
+                keys=(Key("J"),),
             )
             self._controls.number(
                 "Time limit (s)",

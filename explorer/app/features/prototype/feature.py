@@ -57,7 +57,7 @@ class PrototypePanel:
         gui, self._feed = services.gui, services.get(PARTS_FEED)
         self._verdict, self._build = services.get(BuildVerdict), services.get(BUILD_FEED)
         self._built = gui.add_html("")
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
         controls.checkbox(
             "Show the parts",
             "Draw the mechanism as parts that can be made: sized from the design, the radii of "

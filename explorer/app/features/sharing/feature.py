@@ -141,7 +141,8 @@ class ExportDialog:
         gui, buttons = services.gui, services.buttons
         self._ready: tuple[bool, ...] = ()
         sends: dict[str, Callable[[Who], None]] = {}
-        for each in services.exports:
+        self._exports = tuple(each for one in services.features for each in one.exports)
+        for each in self._exports:
             for name in each.formats:
                 value = f"{each.title} as {name}"
                 if is_missing(EXTRA_OF_FORMAT.get(name)):
@@ -166,22 +167,24 @@ class ExportDialog:
                 icon=viser.Icon.PHOTO,
                 hint="PNG of the scene with its labels, from your camera.",
             )
-        button.on_click(
-            lambda event: send_picture(
-                services,
-                (sides[0].value, sides[1].value),
-                event.client_id,
-                transparent=transparent.value,
-            )
+
+        def send(who: Who) -> None:
+            size = sides[0].value, sides[1].value
+            send_picture(services, size, who, transparent=transparent.value)
+
+        button.on_click(lambda event: send(event.client_id))
+        services.commands.offer(
+            transparent, lambda _: setattr(transparent, "value", not transparent.value)
         )
+        services.commands.offer(button, lambda client: send(client.client_id))
 
     def updates(self, _: Frame) -> Iterator[Update]:
         """Yield the updates that show whether the machine can be built, and what there is now."""
         yield self._built, "content", box(self._verdict.html())
-        ready = tuple(each.is_ready(self._services) for each in self._services.exports)
+        ready = tuple(each.is_ready(self._services) for each in self._exports)
         if ready != self._ready:
             self._ready = ready
-            rows = map(_row, self._services.exports, ready)
+            rows = map(_row, self._exports, ready)
             yield self._list, "content", box("".join(rows))
 
 

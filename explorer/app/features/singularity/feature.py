@@ -48,7 +48,7 @@ class SingularityPanel:
     def __init__(self, services: Services) -> None:
         gui, buttons = services.gui, services.buttons
         services.get(margin_hover)
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
         self._summary = gui.add_html("")
         self._copy = services.copy_button(
             "Singularity", lambda state: pose_source("singularity", state.design, state.pose)
@@ -63,6 +63,7 @@ class SingularityPanel:
                 "Draw the nearest pose with an incidence, and the displacements of b1 to b4 to it.",
                 get_args(Ghost),
                 "view.singular.ghost",
+                is_in_palette=True,
             )
             self._strata = StrataPanel(services)
             self._performance = gui.add_html("")
@@ -72,6 +73,7 @@ class SingularityPanel:
                 "or all forces that unit actuator forces hold.",
                 get_args(Gain),
                 "view.singular.ellipsoid",
+                is_in_palette=True,
             )
             controls.checkbox(
                 "Singularity-free ball",
@@ -218,7 +220,7 @@ class StrataPanel:
         gui = services.gui
         self._feed = services.get(work.STRATA_FEED)
         self._words = gui.add_html("")
-        self._controls = Controls(gui, services.session)
+        self._controls = Controls(services)
         self._controls.checkbox(
             "Diagram",
             "Draw which of the 24 relative positions of the two flags border on each other; a "
@@ -376,5 +378,4 @@ SINGULARITY = Feature(
             keys=(shift("G"),),
         ),
     ),
-    lists=("Ghost", "Ellipsoid"),
 )

@@ -118,7 +118,7 @@ class StudiesPanel:
         self._head = gui.add_html("")
         # viser's folders cannot be folded from here; one without a title is shown or hidden.
         with gui.add_folder(None, visible=False) as self.form:
-            self._add_new_study(gui)
+            self._add_new_study(services)
         self.lines = gui.add_html("")
         self._axes_mark = gui.add_html(beside(3), visible=False)
         self._axes: list[tuple[viser.GuiDropdownHandle[str], Control[str]]] = []
@@ -222,8 +222,9 @@ class StudiesPanel:
 
         return Bound(read, write)
 
-    def _add_new_study(self, gui: viser.GuiApi) -> None:
-        self._controls = controls = Controls(gui, self._session)
+    def _add_new_study(self, services: Services) -> None:
+        gui = services.gui
+        self._controls = controls = Controls(services)
         gui.add_html(beside(2))
         controls.slider(
             "Number of designs",

@@ -83,11 +83,11 @@ class OverlaysMenu:
         gui = services.gui
         self._forms = _form_chips(services)
         self._form_row = gui.add_html("")
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = Controls(services)
         with gui.add_folder("Layers"):
-            for label, (name, _) in LAYERS.items():
-                controls.checkbox(label, LAYER_HINTS[name], f"view.{name}")
-        with gui.add_folder("Tetrahedra"):
+            for label, (name, keys) in LAYERS.items():
+                controls.checkbox(label, LAYER_HINTS[name], f"view.{name}", keys=keys)
+        with gui.add_folder("Tetrahedra"), services.commands.within("Tetrahedra"):
             for index, points in enumerate(TETRAHEDRA):
                 controls.checkbox(
                     f"δ{index + 1}:  {' '.join(points)}",
@@ -303,5 +303,4 @@ VIEW = Feature(
             keys=(Key("T"),),
         ),
     ),
-    keys={f"{OVERLAYS} › {label}": keys for label, (_, keys) in LAYERS.items() if keys},
 )

@@ -74,7 +74,7 @@ class WorkspacePanel:
 
     def __init__(self, services: Services) -> None:
         gui, session, buttons = services.gui, services.session, services.buttons
-        self._controls = controls = Controls(gui, session)
+        self._controls = controls = Controls(services)
         self._session = session
         self._feed = services.get(feeds.WORKSPACE_FEED)
         self._volumes = services.get(feeds.VOLUME_FEED)
@@ -90,8 +90,9 @@ class WorkspacePanel:
             "Loads is held.",
             REGIONS,
             Bound(_region, _set_region),
+            is_in_palette=True,
         )
-        self._under_way = UnderWay(gui, "workspace", self._feed)
+        self._under_way = UnderWay(services, "workspace", self._feed)
         self._trouble = gui.add_html("", visible=False)
         self._start = services.link(
             "workspace.start",
@@ -104,6 +105,7 @@ class WorkspacePanel:
             "The orientation of the platform all over the workspace.",
             ORIENTATIONS,
             "view.workspace.orientation",
+            is_in_palette=True,
         )
         controls.dropdown(
             "Colour by",
@@ -112,6 +114,7 @@ class WorkspacePanel:
             "the tool.",
             COLOURINGS,
             "view.workspace.colour",
+            is_in_palette=True,
         )
         self._legend = gui.add_html("", visible=False)
         self._cut = gui.add_html("")
@@ -329,5 +332,4 @@ WORKSPACE = Feature(
     scene=(WorkspaceScene,),
     feeds=(feeds.VOLUME_FEED, feeds.WORKSPACE_FEED),
     tasks=(work.measure_volume, work.draw_workspace),
-    lists=("Region", "Orientation", "Colour by"),
 )
