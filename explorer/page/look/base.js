@@ -11,5 +11,11 @@ window.explorer.recall ??= (name) =>
 window.explorer.keep ??= (name, value) => {
   document.cookie = `explorer-${name}=${value}; path=/; max-age=31536000; samesite=strict`;
 };
+// Says beside a drawing what is under the pointer, or else what a pointer does there.
+window.explorer.tell ??= (drawing, words) => {
+  const reading = drawing?.parentElement?.querySelector(".ex-reading");
+  const wanted = words ?? reading?.dataset.hint;
+  if (reading && reading.textContent !== wanted) reading.textContent = wanted;
+};
 // Calls a function at events of a type, before what they happen to hears of them.
 window.explorer.capture ??= (type, run) => addEventListener(type, run, true);

@@ -158,6 +158,16 @@ window.explorer.labels ??= (() => {
     pen.fillStyle = colour;
     pen.fillText(text, x, y);
   };
+  const stroke = (pen, width, colour, ...lines) => {
+    pen.lineWidth = width;
+    pen.strokeStyle = colour;
+    pen.beginPath();
+    for (const [from, to] of lines) {
+      pen.moveTo(...from);
+      pen.lineTo(...to);
+    }
+    pen.stroke();
+  };
   const writeLabel = (pen, { name, text, at: [x, y], box, gap, props }, look) => {
     // What is pale is so on its whole halo, also in front of a dark body.
     const share = hidden.has(name) ? PALE : 1;
@@ -170,12 +180,7 @@ window.explorer.labels ??= (() => {
         Math.min(Math.max(x, box[0]), box[2]),
         Math.min(Math.max(y, box[1]), box[3]),
       ];
-      pen.lineWidth = 1;
-      pen.strokeStyle = colour;
-      pen.beginPath();
-      pen.moveTo(x, y);
-      pen.lineTo(...nearest);
-      pen.stroke();
+      stroke(pen, 1, colour, [[x, y], nearest]);
     }
     pen.textAlign = "left";
     write(pen, text, box[0], 0.5 * (box[1] + box[3]), colour, look.halo);
@@ -195,13 +200,8 @@ window.explorer.labels ??= (() => {
     for (const { along, axis } of axes) {
       const size = Math.hypot(along[0], along[1]);
       const tip = [x + AXES.length * along[0], y + AXES.length * along[1]];
-      pen.strokeStyle = COLOURS[axis];
+      stroke(pen, 2.5, COLOURS[axis], [[x, y], tip]);
       pen.fillStyle = COLOURS[axis];
-      pen.lineWidth = 2.5;
-      pen.beginPath();
-      pen.moveTo(x, y);
-      pen.lineTo(...tip);
-      pen.stroke();
       pen.beginPath();
       pen.arc(...tip, 3, 0, 2 * Math.PI);
       pen.fill();
@@ -253,16 +253,15 @@ window.explorer.labels ??= (() => {
         [1.5 + HALO, look.halo],
         [1.5, css(look.text)],
       ]) {
-        pen.lineWidth = width;
-        pen.strokeStyle = colour;
-        pen.beginPath();
-        pen.moveTo(left, y - 4);
-        pen.lineTo(left, y + 4);
-        pen.moveTo(left, y);
-        pen.lineTo(left + length, y);
-        pen.moveTo(left + length, y - 4);
-        pen.lineTo(left + length, y + 4);
-        pen.stroke();
+        const right = left + length;
+        const ends = [left, right].map((x) => [
+          [x, y - 4],
+          [x, y + 4],
+        ]);
+        stroke(pen, width, colour, ...ends, [
+          [left, y],
+          [right, y],
+        ]);
       }
       left += length + 8;
     }

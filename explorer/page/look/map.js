@@ -35,12 +35,7 @@ window.explorer.map ??= (() => {
     // The same position on another map is asked about again.
     return { value, key: value + map.dataset.map, place: placeOf(facts, target) };
   };
-  const show = () => {
-    const map = document.querySelector("[data-map]");
-    const reading = map?.parentElement.querySelector(".ex-reading");
-    const wanted = words ?? reading?.dataset.hint;
-    if (reading && reading.textContent !== wanted) reading.textContent = wanted;
-  };
+  const show = () => window.explorer.tell(document.querySelector("[data-map]"), words);
   const ask = () => {
     asked = found;
     window.explorer.press("workspace.read", asked.value);

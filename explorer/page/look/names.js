@@ -98,5 +98,5 @@ window.explorer.names ??= (() => {
   };
   capture("pointerover", pointAt);
   for (const event of ["focusin", "focusout"]) capture(event, mark);
-  return { labelOf };
+  return { labelOf, rowOf };
 })();

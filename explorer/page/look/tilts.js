@@ -38,20 +38,15 @@ window.explorer.tilts ??= (() => {
     const at = pointIn(chart, event);
     return at && (chart.dataset.tilts ? tiltAt(chart, at) : torsionAt(chart, at));
   };
-  const tell = (chart, words) => {
-    const reading = chart?.parentElement?.querySelector(".ex-reading");
-    const wanted = words ?? reading?.dataset.hint;
-    if (reading && reading.textContent !== wanted) reading.textContent = wanted;
-  };
   let last = null;
   const show = () => {
     const chart = last && chartAt(last.target);
-    if (chart) tell(chart, read(chart, last)?.words);
+    if (chart) window.explorer.tell(chart, read(chart, last)?.words);
   };
   addEventListener("pointermove", ({ target, clientX, clientY }) => {
     const left = last?.target.isConnected && chartAt(last.target);
     last = chartAt(target) ? { target, clientX, clientY } : null;
-    if (left && left !== (last && chartAt(target))) tell(left);
+    if (left && left !== (last && chartAt(target))) window.explorer.tell(left);
     show();
   });
   // A chart changes while the mechanism moves, and its reading with it.

@@ -15,12 +15,6 @@ window.explorer.tour ??= (() => {
     wanted = null;
   let ringed = null;
   const isClosed = () => document.querySelector(CLOSED) !== null;
-  // A slider is ringed with its words and its field.
-  const rowOf = (control) => {
-    let row = control;
-    while (row && !row.querySelector("label[for]")) row = row.parentElement;
-    return row;
-  };
   const ring = (element) => {
     if (ringed) delete ringed.dataset.exRing;
     ringed = element;
@@ -45,7 +39,8 @@ window.explorer.tour ??= (() => {
     if (shown?.number !== wanted.number && document.querySelector(DRAWER)) turn();
     if (shown?.number !== wanted.number || ringed?.isConnected) return;
     const control = document.querySelector(wanted.control);
-    ring(control?.matches("[role=slider]") ? rowOf(control) : control);
+    // A slider is ringed with its words and its field.
+    ring(control?.matches("[role=slider]") ? window.explorer.names.rowOf(control) : control);
   };
   const changes = { childList: true, subtree: true, attributeFilter: ["aria-label"] };
   const watch = new MutationObserver(follow);

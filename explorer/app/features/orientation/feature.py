@@ -22,8 +22,10 @@ from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
+from explorer.app.widgets.blocks import content_of
 from explorer.app.widgets.markup import alert, box, caption, dim, remark, row, table
 from explorer.app.widgets.under_way import UnderWay, look_of, problem
+from explorer.measures.blocks.block import Fact, Facts
 from explorer.measures.box import corners_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -231,8 +233,8 @@ def range_words(drawing: work.RangeDrawing, unit: Unit) -> str:
     bound, hint = BOUNDS[drawing.request.over]
     size = design.reach**3
     text = f"{bound} {unit.to_power(3, size).text(solid.volume, 5, size=size)}"
-    name = dim(f"{drawing.request.over.capitalize()} workspace")
-    return table((row(name, text, hint=f"{VOLUME_HINT} {hint}"),))
+    name = f"{drawing.request.over.capitalize()} workspace"
+    return content_of(Facts("", [Fact(name, text, hint=f"{VOLUME_HINT} {hint}")]), {})
 
 
 def _degrees(angle: float) -> str:

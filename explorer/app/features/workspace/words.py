@@ -16,6 +16,7 @@ from explorer.app.widgets.blocks import content_of
 from explorer.app.widgets.buttons import MANUAL, press_button
 from explorer.app.widgets.under_way import problem, progress
 from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
+from explorer.measures.blocks.block import Fact, Facts
 from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
@@ -163,10 +164,10 @@ def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
     nodes, part, request = drawing.nodes, drawing.part, drawing.request
     unit, cubic = state.unit, state.unit_of(3)
     suffix = orientation_suffix(request.design, request.rotation)
-    rows: list[str] = []
+    facts: list[Fact] = []
 
     def add(name: str, value: str, hint: str) -> None:
-        rows.append(markup.row(markup.dim(name + suffix), value, hint=hint))
+        facts.append(Fact(name + suffix, value, hint=hint))
 
     if nodes is not None:
         count, volume, which = format_number(nodes.count), nodes.volume, "Node"
@@ -191,7 +192,7 @@ def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
             add(f"{name} {axis}", text, "Extent of the workspace")
     if drawing.hull_volume is not None:
         add("Hull volume", cubic.text(drawing.hull_volume, 6), "Volume of the convex hull")
-    return markup.table(rows)
+    return content_of(Facts("", facts), {})
 
 
 def legend(
