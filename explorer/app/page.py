@@ -40,6 +40,7 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import sentence
 from explorer.app.widgets.theme import Theme
+from explorer.measures.field_words import message_of
 from explorer.numerics.arrays import FloatArray
 from explorer.page.browser.browser_facts import listen
 from explorer.page.browser.viser_gaps import run_script
@@ -130,6 +131,7 @@ class Page:
             history,
             press_at=presses.at,
             tell=self._tell,
+            words_of=message_of,
         )
         self._drag_pause = clock.Pause(DRAG_PAUSE, self.session.redraw)
         self._quiet_pause = clock.Pause(QUIET_SECONDS, self.session.redraw)
@@ -256,7 +258,7 @@ class Page:
         else:
             self._frame, self._changed = frame, now
         if self.autosaver is not None:
-            self.autosaver.follow(frame.state, self.session.history)
+            self.autosaver.follow(self.session.history)
         # Feeds come first, so that a drawing counts as outdated until the new one arrives.
         for feed in self._feeds:
             feed.follow(frame)

@@ -123,7 +123,7 @@ def _stl_zip(prototype: Prototype) -> bytes:
 
 def exact_parts(sizes: Sizes) -> dict[str, cad.ExactShape]:
     """Return the parts by name, each in the frame of its body, in millimetres."""
-    return {name: shape for name, _, shape in forms_of(sizes, cad.ExactKernel())}
+    return {name: shape for name, _, shape in forms_of(sizes, cad.ExactShapeMaker())}
 
 
 def _step(prototype: Prototype) -> bytes:

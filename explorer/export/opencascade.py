@@ -21,7 +21,7 @@ from explorer.export.mesh import printable_name
 from explorer.files.extras import load_extra
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.shapes import Circle, Kernel
+from explorer.prototype.shapes import Circle, ShapeMaker
 from explorer.singularity.colours import Rgb, linear
 
 SCHEMA = "AP242DIS"
@@ -133,7 +133,7 @@ def primitive(kind: str, *arguments: Any) -> ExactShape:
     return ExactShape(occ(f"BRepPrimAPI_Make{kind}")(*arguments).Shape())
 
 
-class ExactKernel(Kernel):
+class ExactShapeMaker(ShapeMaker):
     """A maker of bodies with exact faces."""
 
     def disc(self, circle: Circle, low: float, high: float) -> ExactShape:

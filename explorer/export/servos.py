@@ -18,9 +18,9 @@ from explorer.errors import NoAnswerError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, STRUT_ROWS, Design
 from explorer.mechanism.kinematics import inverse
-from explorer.motion.inverse_jacobian import forces_of, twists_of_actuators
+from explorer.motion.dynamics import forces_in_motion
+from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.motion.masses import Mass, moving_bodies
-from explorer.motion.weights import carry
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.statics.compliance import softness_with_struts
@@ -130,7 +130,7 @@ def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> S
         )
     # At rest, and with an acceleration of each actuator.
     bodies, accelerations = moving_bodies(design, masses), np.vstack([np.zeros(6), twists])
-    held = forces_of(home, carry(home, bodies, acceleration=accelerations).wrench)
+    held = forces_in_motion(home, bodies, acceleration=accelerations)
     weights, inertia = held[0], np.diag(held[1:] - held[0]) / metres
     stiffness = servo_stiffness(design) if elastic else None
     forces = weights if stiffness is None else np.zeros(6)

@@ -13,7 +13,7 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit
-from explorer.paths.drives import Drives
+from explorer.paths.drives import PathDrives
 from explorer.paths.trajectory import Trajectory
 from explorer.statics.accuracy import IS_TILT, SOURCES
 from explorer.statics.budget import PARTS, SourceCosts
@@ -29,7 +29,7 @@ def trajectory_csv(trajectory: Trajectory, unit_mm: float | None = None) -> str:
     return _csv(head, np.column_stack(columns).tolist())
 
 
-def drives_csv(drives: Drives, trajectory: Trajectory) -> str:
+def drives_csv(drives: PathDrives, trajectory: Trajectory) -> str:
     """Return what a path asks of the actuators as CSV: a header, then a line per sample.
 
     The trajectory of the same path and time law gives the samples. Times are in s, lengths in mm,

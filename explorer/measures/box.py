@@ -20,13 +20,12 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import SINGULAR, margins
 from explorer.mechanism.pose import Pose, Triple
-from explorer.motion.weights import MovingBodies, payload_wrench
+from explorer.motion.weights import payload_wrench
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.statics import compliance, slopes
 from explorer.statics.accuracy import ToolError, actuator_errors, worst_errors
-from explorer.statics.reactions import Reactions, largest_accelerations, limit_shares, reactions
+from explorer.statics.reactions import largest_accelerations, limit_shares, payload_reactions
 from explorer.workspace.least_clearance import node_measures
-from explorer.workspace.workspace import Workspace
 
 BOX_NODES = 9
 """Number of nodes on each axis of the grid over a required box, its faces included."""
@@ -77,7 +76,7 @@ def positions_over(
         if box is None:
             raise InputError("positions over a box need a box, and the design has none")
         return box_nodes(box)
-    nodes = node_measures(Workspace(design, pose.rotation)).positions
+    nodes = node_measures(design, pose.rotation).positions
     if not len(nodes):
         raise NoAnswerError("no position of a grid of 20 × 20 × 20 nodes is within the limits")
     return nodes
@@ -125,11 +124,6 @@ class BoxStatics(Configuration):
         return bool(box_margins(self.box, self.rotation).all())
 
     @cached_property
-    def reactions(self) -> Reactions:
-        """The reactions to the weight of the payload."""
-        return reactions(self, np.zeros(6), MovingBodies().with_payload(self.design))
-
-    @cached_property
     def errors(self) -> ToolError:
         """The worst errors of the tool at the nodes, each of shape (n,)."""
         return worst_errors(self, actuator_errors(self.design))
@@ -153,7 +147,7 @@ class BoxStatics(Configuration):
     @cached_property
     def node_utilisations(self) -> FloatArray:
         """The utilisations of the limits at the nodes, shape (n, 12), as in `LIMITED`."""
-        return limit_shares(self.design, self.reactions)
+        return limit_shares(self.design, payload_reactions(self))
 
     @property
     def utilisations(self) -> FloatArray:
@@ -163,7 +157,8 @@ class BoxStatics(Configuration):
     @property
     def bending(self) -> FloatArray:
         """The bending moments of the struts at the nodes, shape (n, 2), in N × unit."""
-        return self.reactions.bending + self.reactions.spread[:, slopes.BENDING]
+        held = payload_reactions(self)
+        return held.bending + held.spread[:, slopes.BENDING]
 
     @cached_property
     def accelerations(self) -> FloatArray:
@@ -196,7 +191,7 @@ class BoxStatics(Configuration):
             return {}
         twists = slopes.twist_slopes(self.design, self.positions, self.rotation)
         parts = np.divmod(np.arange(10 * len(self.positions)), 10)
-        largest, by = slopes.share_slopes(self.design, self.rotation, twists, parts, limits)
+        largest, by = slopes.utilisation_slopes(self.design, self.rotation, twists, parts, limits)
         return _by_name(by[largest.argmax()])
 
     def acceleration_slopes(self) -> Mapping[str, float]:

@@ -9,8 +9,18 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.motion.inverse_jacobian import forces_of
 from explorer.motion.masses import DENSITY, bar_masses, moving_bodies
-from explorer.motion.weights import MovingBodies, carry
+from explorer.motion.weights import AT_REST, MovingBodies, carry
 from explorer.numerics.arrays import FloatArray
+
+
+def forces_in_motion(
+    configuration: Configuration,
+    bodies: MovingBodies,
+    twist: ArrayLike = AT_REST,
+    acceleration: ArrayLike = AT_REST,
+) -> FloatArray:
+    """Return the forces of the actuators, (..., 6), in N; arguments and errors as in `carry`."""
+    return forces_of(configuration, carry(configuration, bodies, twist, acceleration).wrench)
 
 
 def inverse_dynamics(
@@ -49,5 +59,4 @@ def inverse_dynamics(
             "the platform has no mass, so that a motion needs no force: give the payload of "
             "the design a mass, or let the bodies of the prototype count"
         )
-    c = Configuration(design, position, rotation)
-    return forces_of(c, carry(c, bodies, twist, acceleration).wrench)
+    return forces_in_motion(Configuration(design, position, rotation), bodies, twist, acceleration)

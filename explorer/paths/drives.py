@@ -22,18 +22,18 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
 from explorer.mechanism.pose import Pose, Triple
-from explorer.motion.inverse_jacobian import forces_of
+from explorer.motion.dynamics import forces_in_motion
 from explorer.motion.masses import DENSITY, bar_masses, moving_bodies
-from explorer.motion.weights import MovingBodies, carry
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.shortest_time import SINGULAR, law_of_shortest_time
 from explorer.paths.time_law import Motion, TimeLaw, law_at_speed
 from explorer.workspace.limits.valid_moves import LARGEST_TURN, moves_are_valid
 from explorer.workspace.limits.valid_poses import violations
 
-# Share of a limit from which it counts as exceeded, rather than used up to rounding.
+# Utilisation from which a limit counts as exceeded, rather than used up to rounding.
 BEYOND = 1.0 + 1e-6
-# Share of a limit from which it binds.
+# Utilisation from which a limit binds.
 BINDING = 1.0 - 1e-3
 # Parts of an interval, and their weights in its mean by Simpson's rule.
 PARTS, WEIGHTS = (0.0, 0.5, 1.0), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
@@ -64,8 +64,8 @@ class Binding(NamedTuple):
 
     Attributes:
         limit: Its name.
-        share: Share of it that is used, above 1 beyond it.
-        time: Time of the largest share in seconds; None for the continuous force.
+        share: Largest utilisation of it, above 1 beyond it.
+        time: Time of that in seconds; None for the continuous force.
     """
 
     limit: str
@@ -73,7 +73,7 @@ class Binding(NamedTuple):
     time: float | None
 
 
-class Summary(NamedTuple):
+class ActuatorSummary(NamedTuple):
     """Peaks and means of the six actuators along a path, each of shape (6,).
 
     Attributes:
@@ -119,7 +119,7 @@ class ActuatorMotion:
         twist, bend = moves.slopes(motion.number, c.rotation)
         rate, change = motion.rate[:, None], motion.change[:, None]
         acceleration = change * twist + rate**2 * bend
-        force = forces_of(c, carry(c, bodies, rate * twist, acceleration).wrench)
+        force = forces_in_motion(c, bodies, rate * twist, acceleration)
         if not np.isfinite(force).all():
             raise NoAnswerError(SINGULAR)
         return ActuatorMotion(
@@ -136,7 +136,7 @@ class ActuatorMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class Drives(ActuatorMotion):
+class PathDrives(ActuatorMotion):
     """The motion of the actuators along a path, at three times in each interval of its law.
 
     Attributes:
@@ -150,7 +150,7 @@ class Drives(ActuatorMotion):
     bodies: MovingBodies
 
     @staticmethod
-    def along(design: Design, law: TimeLaw, bodies: MovingBodies) -> Drives:
+    def along(design: Design, law: TimeLaw, bodies: MovingBodies) -> PathDrives:
         """Return what a time law asks of the actuators; arguments and errors as in `of`."""
         # One part after the other, because a path of many moves has a million intervals.
         found = [
@@ -162,17 +162,17 @@ class Drives(ActuatorMotion):
                 *((m.time, m.speed, m.acceleration, m.force) for m in found), strict=True
             )
         )
-        return Drives(time, speed, acceleration, force, design, law, bodies)
+        return PathDrives(time, speed, acceleration, force, design, law, bodies)
 
     def at(self, time: FloatArray) -> ActuatorMotion:
         """Return the motion of the actuators at times (n,)."""
         return self.of(self.design, self.law, self.law.at(time), self.bodies)
 
     @cached_property
-    def summary(self) -> Summary:
+    def summary(self) -> ActuatorSummary:
         """Peaks and means of each actuator."""
         force, power = np.abs(self.force), np.abs(self.power)
-        return Summary(
+        return ActuatorSummary(
             peak_speed=np.abs(self.speed).max(axis=0),
             peak_force=force.max(axis=0),
             rms_force=np.sqrt(self.mean(force**2)),
@@ -212,7 +212,7 @@ class Drives(ActuatorMotion):
         return tuple(tuple(limits_of(joint)) for joint in range(6))
 
 
-def drives_along(design: Design, path: TimedPath) -> Drives:
+def drives_along(design: Design, path: TimedPath) -> PathDrives:
     """Return what a path within the limits of a design asks of its actuators.
 
     Raises:
@@ -235,7 +235,7 @@ def drives_along(design: Design, path: TimedPath) -> Drives:
         law = law_at_speed(design, moves, acceleration=1.0).lasting(path.duration)
     elif law is None:
         law = law_of_shortest_time(design, moves, bodies)
-    return Drives.along(design, law, bodies)
+    return PathDrives.along(design, law, bodies)
 
 
 def check_limits(design: Design, moves: StraightMoves) -> None:
@@ -261,7 +261,7 @@ def check_limits(design: Design, moves: StraightMoves) -> None:
     raise InputError(f"{which} is not proved to keep the margins and clearances all along")
 
 
-def drive_blocks(drives: Drives) -> Iterator[block.Block]:
+def drive_blocks(drives: PathDrives) -> Iterator[block.Block]:
     """Yield what a path asks of the actuators, and of one motor for all six."""
     units = (" mm/s,", " N peak force,", " N continuous force (RMS) and", " W peak power.")
     speed, force, steady, power = map(block.Number, [*drives.least_motor.values()][:4], units)

@@ -1,11 +1,11 @@
-"""The load along a path: the largest share of a limit at samples, and a bound of all between them.
+"""The load along a path: utilisations of limits at samples, and a bound of all between them.
 
 A sample is in the middle of an interval of a straight move. In the axes of the platform the force
 f_j of joint j acts at a fixed point, and within the interval it turns by ν_j at most. By virtual
 work that asks |v_ij| ν_j f_j of actuator i at most, where v_ij is the velocity of the point at a
 unit rate of actuator i. Where m = max_i Σ_j |v_ij| ν_j is below 1, no pose of the interval is
 singular, and all that is asked changes the forces by at most 1 / (1 − m) times as much. Intervals
-are halved until the bounds are near the largest share.
+are halved until the bounds are near the largest utilisation.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, lengths_of
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.statics.reactions import LIMITED, Reactions, limit_shares, reactions
 
-# Difference of bound and largest share, over that share, at which halving ends; and rounding.
+# Difference of bound and largest utilisation, over the latter, at which halving ends; and rounding.
 TOLERANCE, ROUNDING = 0.02, 1e-9
 # Samples within a move at first, and the most samples of all moves.
 FIRST_SAMPLES, MOST_SAMPLES = 16, 20_000
@@ -36,38 +36,38 @@ FIRST_SAMPLES, MOST_SAMPLES = 16, 20_000
 
 @dataclass(frozen=True)
 class PathLoads:
-    """The shares of the limits that a load uses over a path, at samples.
+    """The utilisations of the limits by a load over a path, at samples.
 
     Attributes:
         at: Place of the samples: number of the move plus the share of it, ascending, shape (n,).
-        shares: Shares of the samples in the order of `LIMITED`, shape (n, 12); infinite in a
+        utilisations: Those of the samples in the order of `LIMITED`, shape (n, 12); infinite in a
             singular pose.
-        bound: Upper bound of the shares over the whole path; infinite if the path is singular, or
+        bound: Upper bound of them over the whole path; infinite if the path is singular, or
             so nearly that none was found.
     """
 
     at: FloatArray
-    shares: FloatArray
+    utilisations: FloatArray
     bound: float
 
     @property
-    def share(self) -> float:
-        """The largest share of the samples, of which 1 is the limit."""
-        return float(self.shares.max())
+    def utilisation(self) -> float:
+        """The largest utilisation of the samples."""
+        return float(self.utilisations.max())
 
     @property
     def place(self) -> float:
-        """Where the largest share is: number of the move plus the share of it."""
-        return float(self.at[self.shares.max(axis=1).argmax()])
+        """Where the largest utilisation is: number of the move plus the share of it."""
+        return float(self.at[self.utilisations.max(axis=1).argmax()])
 
     @property
     def part(self) -> int | None:
-        """Index in `LIMITED` of the part with the largest share.
+        """Index in `LIMITED` of the part with the largest utilisation.
 
         It is None without a limit or load, and if the path is singular.
         """
-        part = int(self.shares.max(axis=0).argmax())
-        return part if 0.0 < self.share < math.inf else None
+        part = int(self.utilisations.max(axis=0).argmax())
+        return part if 0.0 < self.utilisation < math.inf else None
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ class DemandedLoad:
         six = load_array(load)
         return DemandedLoad(design, six, weights or MovingBodies().with_payload(design))
 
-    def shares(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-        """Return the shares of the limits in poses, shape (..., 12), in the order of `LIMITED`.
+    def utilisations(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+        """Return the utilisations of the limits in poses, shape (..., 12), as in `LIMITED`.
 
         The poses are positions of b4, shape (..., 3), and rotations, shape (..., 3, 3).
         """
@@ -100,19 +100,19 @@ class DemandedLoad:
         return np.asarray(self._sample(moves, only_holds=True)[2] <= 1.0 + TOLERANCE)
 
     def over(self, path: PathMargins, tool: ArrayLike | None = None) -> PathLoads:
-        """Return the shares over a path of a tool, given with its crossings."""
-        at, shares, bounds = self._sample(StraightMoves.along(path.poses, tool))
+        """Return the utilisations over a path of a tool, given with its crossings."""
+        at, used, bounds = self._sample(StraightMoves.along(path.poses, tool))
         at = np.append(at, [crossing.move + crossing.share for crossing in path.crossings])
         infinite = np.full((len(path.crossings), len(LIMITED)), np.inf)
-        shares = np.append(shares, infinite, axis=0)
+        used = np.append(used, infinite, axis=0)
         order = np.argsort(at, kind="stable")
         bound = math.inf if path.crossings else float(bounds.max())
-        return PathLoads(at[order], shares[order], bound)
+        return PathLoads(at[order], used[order], bound)
 
     def _sample(
         self, moves: StraightMoves, *, only_holds: bool = False
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return places (n,), shares of the limits (n, 12), and bounds of them over the moves (m,).
+        """Return places (n,), utilisations (n, 12), and bounds of these over the moves (m,).
 
         With `only_holds` halving of a move ends once it is certain whether it holds the load, and
         the bound of a move that does not is infinite.
@@ -127,9 +127,9 @@ class DemandedLoad:
         found: list[tuple[FloatArray, FloatArray]] = []
         left = MOST_SAMPLES
         while True:
-            shares, bound = self._bound(moves, number, share, half)
-            found.append((number + share, shares))
-            np.maximum.at(best, number, shares.max(axis=1))
+            used, bound = self._bound(moves, number, share, half)
+            found.append((number + share, used))
+            np.maximum.at(best, number, used.max(axis=1))
             is_loose = bound > (1.0 + TOLERANCE) * (1.0 if only_holds else best.max())
             if only_holds:
                 bounds[best > 1.0 + ROUNDING] = np.inf
@@ -147,7 +147,7 @@ class DemandedLoad:
     def _bound(
         self, moves: StraightMoves, number: IntArray, share: FloatArray, half: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the shares of the limits in the middle of intervals, (n, 12), and bounds, (n,).
+        """Return the utilisations in the middle of intervals, (n, 12), and their bounds, (n,).
 
         An interval is given by the number of its move, the share of that in its middle, and its
         half as a share, shape (n,) each.
@@ -212,7 +212,7 @@ def path_loads(
     tool: Triple | None = None,
     weights: MovingBodies | None = None,
 ) -> PathLoads:
-    """Return the shares of the limits that a load uses over a path of straight moves.
+    """Return the utilisations of the limits by a load over a path of straight moves.
 
     The payload's force of any direction acts besides.
 

@@ -198,10 +198,10 @@ def _check_ends(start: Snapshot, goal: Snapshot, load: DemandedLoad | None) -> N
         if broken:
             raise InputError(f"the {name} is outside the limits: {'; '.join(broken)}")
         if load is not None:
-            shares = load.shares(end.pose.position, end.pose.rotation)
-            part, share = int(shares.argmax()), float(shares.max())
-            if share > 1.0 + ROUNDING:
-                number, _ = format_apart((100.0 * share, 100.0), 4)
+            used = load.utilisations(end.pose.position, end.pose.rotation)
+            part, most = int(used.argmax()), float(used.max())
+            if most > 1.0 + ROUNDING:
+                number, _ = format_apart((100.0 * most, 100.0), 4)
                 raise InputError(
                     f"the {name} does not hold the load: {PART_NAMES[part]} at {number} % of its "
                     "limit"

@@ -23,11 +23,11 @@ from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import or_infinite
-from explorer.motion.inverse_jacobian import forces_of
-from explorer.motion.weights import MovingBodies, carry
+from explorer.motion.dynamics import forces_in_motion
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_apart
-from explorer.paths.time_law import PLATFORM, Intervals, TimeLaw, Travel
+from explorer.paths.time_law import PLATFORM, LedIntervals, TimeLaw, Travel
 
 # Fewest intervals of a move, and steps of an interval after which limits are checked.
 FEWEST_INTERVALS, STEPS = 64, 10
@@ -36,7 +36,7 @@ SINGULAR = "the path is singular, so that no forces move the platform along it"
 UNBOUNDED = 1e4
 
 
-class Bounds(NamedTuple):
+class RateBounds(NamedTuple):
     """What the limits of the actuators demand at places of a path: a u + b x ≤ most, x ≤ square.
 
     Attributes:
@@ -50,7 +50,9 @@ class Bounds(NamedTuple):
     square: FloatArray
 
     @staticmethod
-    def along(travel: Travel, number: IntArray, share: FloatArray, bodies: MovingBodies) -> Bounds:
+    def along(
+        travel: Travel, number: IntArray, share: FloatArray, bodies: MovingBodies
+    ) -> RateBounds:
         """Return the bounds by the limits of the design at shares of moves, shape (n,) each.
 
         Raises:
@@ -60,7 +62,7 @@ class Bounds(NamedTuple):
         c, rest = Configuration(design, *moves.poses(number, share)), np.zeros(6)
         twist, bend = moves.slopes(number, c.rotation)
         at_rest, with_u, with_x = (
-            forces_of(c, carry(c, bodies, *motion).wrench)
+            forces_in_motion(c, bodies, *motion)
             for motion in ((rest, rest), (rest, twist), (twist, bend))
         )
         if not np.isfinite(at_rest).all():
@@ -86,7 +88,7 @@ class Bounds(NamedTuple):
         a, b = (np.concatenate([each, -each], axis=-1) for each in (a, b))
         unmoved = np.full(slope.shape, np.inf)
         fastest = np.divide(speed, np.abs(slope), out=unmoved, where=slope != 0.0)
-        return Bounds(a, b, most, fastest.min(axis=-1) ** 2)
+        return RateBounds(a, b, most, fastest.min(axis=-1) ** 2)
 
 
 def law_of_shortest_time(design: Design, moves: StraightMoves, bodies: MovingBodies) -> TimeLaw:
@@ -108,14 +110,14 @@ def law_of_shortest_time(design: Design, moves: StraightMoves, bodies: MovingBod
         np.concatenate,
         zip(*((*law.intervals, law.speed, law.acceleration) for law in laws), strict=True),
     )
-    return TimeLaw(travel, Intervals(number, leader, share), speed, acceleration)
+    return TimeLaw(travel, LedIntervals(number, leader, share), speed, acceleration)
 
 
 def _law_of_move(
     travel: Travel, number: IntArray, share: FloatArray, bodies: MovingBodies
 ) -> TimeLaw:
     """Return the law of one move, whose grid points have a number and shares, shape (n,)."""
-    bounds = Bounds.along(travel, number, share, bodies)
+    bounds = RateBounds.along(travel, number, share, bodies)
     sides = np.sign(bounds.a) * np.isfinite(bounds.most)
     if not ((sides.max(axis=1) > 0.0) & (sides.min(axis=1) < 0.0)).all():
         raise InputError(
@@ -123,7 +125,7 @@ def _law_of_move(
             "actuators.acceleration_mm_s2, or actuators.push_n and masses to move; or choose a "
             "duration"
         )
-    intervals = Intervals.between(number, np.full(len(number), PLATFORM), share)
+    intervals = LedIntervals.between(number, np.full(len(number), PLATFORM), share)
     intervals = intervals.select(np.arange(len(number) - 1))
     speeds = travel.of_platform(number) * _fastest_rates(share, bounds)
     speed = np.stack([speeds[:-1], speeds[1:]], axis=1)
@@ -131,14 +133,14 @@ def _law_of_move(
     law = TimeLaw(travel, intervals, speed, acceleration)
     # Between grid points a limit may be exceeded by a little.
     motion = law.within_intervals([i / STEPS for i in range(STEPS)])
-    finer = Bounds.along(travel, motion.number, motion.share, bodies)
+    finer = RateBounds.along(travel, motion.number, motion.share, bodies)
     squares = motion.rate**2
     used = (finer.a * motion.change[:, None] + finer.b * squares[:, None]) / finer.most
     excess = max(1.0, used.max(), (squares / finer.square).max())
     return law.lasting(math.sqrt(excess) * law.duration)
 
 
-def _fastest_rates(share: FloatArray, bounds: Bounds) -> FloatArray:
+def _fastest_rates(share: FloatArray, bounds: RateBounds) -> FloatArray:
     """Return the greatest rates at shares of a move, shape (n,), which start and end at zero."""
     algorithm, constraint = load_extra("timing", "toppra.algorithm", "toppra.constraint")
     is_bounded = np.isfinite(bounds.most).all(axis=0)

@@ -60,7 +60,7 @@ class Motion(NamedTuple):
     curvature: FloatArray
 
 
-class Intervals(NamedTuple):
+class LedIntervals(NamedTuple):
     """Intervals of moves with their leaders.
 
     Attributes:
@@ -74,14 +74,14 @@ class Intervals(NamedTuple):
     share: FloatArray
 
     @staticmethod
-    def between(number: IntArray, leader: IntArray, share: FloatArray) -> Intervals:
+    def between(number: IntArray, leader: IntArray, share: FloatArray) -> LedIntervals:
         """Return the intervals from points of moves, (n,) each, to the next; the last have none."""
         last = np.maximum(share, np.append(share[1:], 0.0))
-        return Intervals(number, leader, np.stack([share, last], axis=1))
+        return LedIntervals(number, leader, np.stack([share, last], axis=1))
 
-    def select(self, index: IntArray | BoolArray) -> Intervals:
+    def select(self, index: IntArray | BoolArray) -> LedIntervals:
         """Return the intervals at an index (k,), or where it is true."""
-        return Intervals(self.number[index], self.leader[index], self.share[index])
+        return LedIntervals(self.number[index], self.leader[index], self.share[index])
 
 
 class Travel(NamedTuple):
@@ -103,12 +103,12 @@ class Travel(NamedTuple):
         """Return the travel of the platform over moves by number (...), of the same shape."""
         return PLATFORM_TRAVEL * self.moves.lengths(self.design.reach, number)
 
-    def ways(self, intervals: Intervals) -> FloatArray:
+    def ways(self, intervals: LedIntervals) -> FloatArray:
         """Return how far the leader goes in each interval, shape (n,)."""
         start, end = (self._led(intervals, at) for at in intervals.share.T)
         return np.abs(end - start)
 
-    def shares_after(self, intervals: Intervals, part: FloatArray) -> FloatArray:
+    def shares_after(self, intervals: LedIntervals, part: FloatArray) -> FloatArray:
         """Return the shares at which leaders have gone a part, 0 to 1, of their ways, (n,)."""
         first, last = intervals.share[:, 0], intervals.share[:, 1]
         start, whole = self._led(intervals, first), self.ways(intervals)
@@ -121,7 +121,7 @@ class Travel(NamedTuple):
         at = find_roots(beyond, -part * whole / scale, (1.0 - part) * whole / scale, ROOT_ERROR)
         return np.where(part < 1.0, first + at * (last - first), last)
 
-    def _led(self, intervals: Intervals, share: FloatArray) -> FloatArray:
+    def _led(self, intervals: LedIntervals, share: FloatArray) -> FloatArray:
         """Return the travel of the leaders at shares of their moves, shape (n,)."""
         joints = inverse(self.design, *self.moves.poses(intervals.number, share))
         platform = (self.of_platform(intervals.number) * share)[:, None]
@@ -149,7 +149,7 @@ class Travel(NamedTuple):
         even = [np.linspace(0.0, 1.0, count + 1, dtype=np.float64) for count in counts]
         return np.repeat(moving, counts + 1), np.sin(0.5 * math.pi * np.concatenate(even)) ** 2
 
-    def led_intervals(self) -> Intervals:
+    def led_intervals(self) -> LedIntervals:
         """Return intervals of a grid, each led by the fastest of the seven; errors are its own."""
         number, share = self.grid(FEWEST_INTERVALS)
         leader, is_needed = self._fastest(number, share), np.ones(len(number), dtype=np.bool_)
@@ -161,7 +161,7 @@ class Travel(NamedTuple):
             is_needed = np.insert(is_needed, at + 1, False)
         # Of the points between those of the grid only those at which the leader changes.
         is_needed[1:] |= leader[1:] != leader[:-1]
-        return Intervals.between(
+        return LedIntervals.between(
             number[is_needed], leader[is_needed] % (PLATFORM + 1), share[is_needed]
         )
 
@@ -191,7 +191,7 @@ class TimeLaw:
     """
 
     travel: Travel
-    intervals: Intervals
+    intervals: LedIntervals
     speed: FloatArray
     acceleration: FloatArray
 
@@ -285,7 +285,7 @@ def law_at_speed(
         # Divide the intervals in which a ramp ends.
         number, leader = (np.insert(each, index + 1, each[index]) for each in led[:2])
         first, gone = np.insert(led.share[:, 0], index + 1, at), np.insert(gone, index + 1, cuts)
-        led = Intervals.between(number, leader, first)
+        led = LedIntervals.between(number, leader, first)
         move = np.unique(number, return_inverse=True)[1]
         # Travel to the nearer end of the move, from both ends of each interval.
         gone = np.stack([gone[:-1], gone[1:]], axis=1)

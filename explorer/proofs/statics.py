@@ -26,7 +26,7 @@ from explorer.numerics.cells import CellValues, corners_of_cells, largest_values
 from explorer.proofs.proof import Proof, proofs_of
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, largest_deflection, stiffness_of
-from explorer.statics.reactions import PART_NAMES, least_limits, shares_in_motion
+from explorer.statics.reactions import PART_NAMES, least_limits, utilisations_in_motion
 
 # Tolerance of a proof, over the largest value allowed: what is computed keeps to the value itself.
 TOLERANCE = 1e-6
@@ -101,7 +101,7 @@ def prove_load(
     what = "acceleration by" if acceleration else "load of"
 
     def ratios(at: Configuration) -> FloatArray:
-        return shares_in_motion(at, acceleration)[..., parts] / most
+        return utilisations_in_motion(at, acceleration)[..., parts] / most
 
     def second(forces: CellForces) -> FloatArray:
         force = forces.of_load(design, acceleration)

@@ -16,8 +16,8 @@ from explorer.motion.chains import BODIES, LEGS, Chains, Places
 from explorer.motion.masses import Mass, total_mass
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.fitting import sizes_of
-from explorer.prototype.shapes import Part, make_parts
-from explorer.prototype.sizes import Sizes, Stroke
+from explorer.prototype.shapes import PrototypePart, make_parts
+from explorer.prototype.sizes import Sizes, StrokeRange
 
 # The gap between layers of the exploded view: over the reach, and over the largest leg radius.
 _GAP, _GAP_IN_RADII = 0.05, 6.0
@@ -28,7 +28,7 @@ class Prototype:
     """The parts of a design, with unique names and the base first, and their sizes."""
 
     sizes: Sizes
-    parts: tuple[Part, ...]
+    parts: tuple[PrototypePart, ...]
 
     @property
     def design(self) -> Design:
@@ -128,8 +128,8 @@ class Actuator:
     """
 
     leg: int
-    stroke: Stroke
-    required: Stroke
+    stroke: StrokeRange
+    required: StrokeRange
     diameter: float
     mass: float
 

@@ -32,7 +32,7 @@ from explorer.prototype.sizes import (
     SLACK,
     THINNEST_LEG,
     Sizes,
-    Stroke,
+    StrokeRange,
 )
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
@@ -150,10 +150,10 @@ class Buildability:
 
         None if none is short, or if a cylinder is too long for its rod to have any stroke.
         """
-        design, limits = self.sizes.design, dict[str, Stroke]()
+        design, limits = self.sizes.design, dict[str, StrokeRange]()
         for leg in self.short_legs:
             low, high = (end / design.unit_mm for end in self.sizes.strokes[leg - 1])
-            limits[LENGTHS[leg - 1]] = Stroke(_round(low, up=True), _round(high, up=False))
+            limits[LENGTHS[leg - 1]] = StrokeRange(_round(low, up=True), _round(high, up=False))
         has_strokes = limits and all(low < high for low, high in limits.values())
         return design.with_limits(**limits) if has_strokes else None
 

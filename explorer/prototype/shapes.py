@@ -1,4 +1,4 @@
-"""The forms of the parts, as booleans of simple shapes that any `Kernel` can make, and as meshes.
+"""Forms of the parts: booleans of simple shapes that any `ShapeMaker` can make, as meshes.
 
 Shapes are in millimetres, each in the frame of its body (`explorer.motion.chains`). Closed
 meshes are made by manifold3d, which no other module of the prototype uses.
@@ -46,7 +46,7 @@ SEGMENTS = 48
 _INSCRIBED = 0.99425
 
 
-class Kernel:
+class ShapeMaker:
     """A maker of polyhedra in millimetres: inscribed in round shapes, circumscribed about holes.
 
     A maker of other bodies overrides every method.
@@ -95,7 +95,7 @@ class Kernel:
 _SLIM = 0.55
 
 
-def forms_of(sizes: Sizes, k: Kernel) -> Iterator[tuple[str, str, Shape]]:
+def forms_of(sizes: Sizes, k: ShapeMaker) -> Iterator[tuple[str, str, Shape]]:
     """Yield the name, the body and the shape of all parts, the base first."""
     yield "base", "base", _base(k, sizes)
     for leg, dims in zip(LEGS, sizes.legs, strict=True):
@@ -110,7 +110,7 @@ def forms_of(sizes: Sizes, k: Kernel) -> Iterator[tuple[str, str, Shape]]:
         yield f"ball {leg}", "platform", _ball(k, sizes, leg)
 
 
-def _base(k: Kernel, sizes: Sizes) -> Shape:
+def _base(k: ShapeMaker, sizes: Sizes) -> Shape:
     """Return the base: its plate, the lugs of both universal joints, the rails on pillars."""
     side, unit, guide = sizes.chains.side, sizes.design.unit_mm, sizes.guide
     low, high = -sizes.depth - sizes.base_plate, -sizes.depth
@@ -136,7 +136,7 @@ def _base(k: Kernel, sizes: Sizes) -> Shape:
     return k.union(pieces).rotate((180.0 * (side < 0), 0.0, 0.0))
 
 
-def _lugs(k: Kernel, dims: LegSizes, low: float) -> Shape:
+def _lugs(k: ShapeMaker, dims: LegSizes, low: float) -> Shape:
     """Return the two eyes that hold the first axis, on stems down to the base plate."""
     eye = k.disc(Circle(dims.eye), dims.inner, dims.outer).rotate((0.0, 90.0, 0.0))
     # The lug is as narrow as the fork's arms, which pass it when the leg leans both ways.
@@ -146,7 +146,7 @@ def _lugs(k: Kernel, dims: LegSizes, low: float) -> Shape:
     return k.union([lug, lug.mirror((1.0, 0.0, 0.0))]) - hole.rotate((0.0, 90.0, 0.0))
 
 
-def _cross(k: Kernel, dims: LegSizes) -> Shape:
+def _cross(k: ShapeMaker, dims: LegSizes) -> Shape:
     """Return the cross of a universal joint: two shafts, their ends thinner."""
     half = dims.inner - CLEARANCE
     pin = k.disc(Circle(dims.pin), -dims.outer, dims.outer)
@@ -154,7 +154,7 @@ def _cross(k: Kernel, dims: LegSizes) -> Shape:
     return shaft.rotate((0.0, 90.0, 0.0)) + shaft.rotate((90.0, 0.0, 0.0))
 
 
-def _carriage(k: Kernel, sizes: Sizes, dims: LegSizes) -> Shape:
+def _carriage(k: ShapeMaker, sizes: Sizes, dims: LegSizes) -> Shape:
     """Return a sleeve on the square shaft, with a flange at both ends."""
     guide, half, flange = sizes.guide, dims.radius, _flange(dims)
     pieces = [
@@ -171,7 +171,7 @@ def _flange(dims: LegSizes) -> float:
     return max(0.2 * dims.radius, 0.25)
 
 
-def _cylinder(k: Kernel, sizes: Sizes, leg: int) -> Shape:
+def _cylinder(k: ShapeMaker, sizes: Sizes, leg: int) -> Shape:
     """Return a cylinder, open at its end, with the eye or the fork that joins it to the base."""
     dims, stroke = sizes.legs[leg - 1], sizes.strokes[leg - 1]
     top = stroke.shortest - dims.end - CLEARANCE
@@ -181,7 +181,7 @@ def _cylinder(k: Kernel, sizes: Sizes, leg: int) -> Shape:
     return tube + (_ring(k, sizes, dims) if leg in ON_GUIDE else _fork(k, dims))
 
 
-def _ring(k: Kernel, sizes: Sizes, dims: LegSizes) -> Shape:
+def _ring(k: ShapeMaker, sizes: Sizes, dims: LegSizes) -> Shape:
     """Return the eye of a leg about the guide."""
     guide = sizes.guide
     half = dims.radius - _flange(dims) - CLEARANCE
@@ -193,7 +193,7 @@ def _ring(k: Kernel, sizes: Sizes, dims: LegSizes) -> Shape:
     return (around + neck) - hole.rotate((0.0, 90.0, 0.0))
 
 
-def _fork(k: Kernel, dims: LegSizes) -> Shape:
+def _fork(k: ShapeMaker, dims: LegSizes) -> Shape:
     """Return the two eyes that hold the second axis, and the bridge between them."""
     eye = k.disc(Circle(dims.eye), dims.inner, dims.outer).rotate((-90.0, 0.0, 0.0))
     half = _SLIM * dims.eye
@@ -204,7 +204,7 @@ def _fork(k: Kernel, dims: LegSizes) -> Shape:
     return k.union([arms, arms.mirror((0.0, 1.0, 0.0)), bridge])
 
 
-def _rod(k: Kernel, sizes: Sizes, leg: int) -> Shape:
+def _rod(k: ShapeMaker, sizes: Sizes, leg: int) -> Shape:
     """Return a rod with the cup of the ball joint, whose centre is the origin."""
     dims, stroke = sizes.legs[leg - 1], sizes.strokes[leg - 1]
     length = stroke.shortest - dims.floor - CLEARANCE
@@ -212,7 +212,7 @@ def _rod(k: Kernel, sizes: Sizes, leg: int) -> Shape:
     return cup + k.disc(Circle(dims.rod), -length, -dims.end + 0.5 * dims.wall)
 
 
-def _platform(k: Kernel, sizes: Sizes) -> Shape:
+def _platform(k: ShapeMaker, sizes: Sizes) -> Shape:
     """Return the platform plate, beyond the platform plane, with a hole for each ball's neck."""
     points = sizes.design.platform_points * sizes.design.unit_mm
     low, high = sizes.standoff, sizes.standoff + sizes.platform_plate
@@ -223,7 +223,7 @@ def _platform(k: Kernel, sizes: Sizes) -> Shape:
     return _facing(plate - holes, sizes)
 
 
-def _ball(k: Kernel, sizes: Sizes, leg: int) -> Shape:
+def _ball(k: ShapeMaker, sizes: Sizes, leg: int) -> Shape:
     """Return a ball on its neck, which reaches through the platform plate."""
     dims = sizes.legs[leg - 1]
     x, y, _ = (sizes.design.platform_points[leg - 1] * sizes.design.unit_mm).tolist()
@@ -237,7 +237,7 @@ def _facing(shape: Shape, sizes: Sizes) -> Shape:
 
 
 @dataclass(frozen=True)
-class Part:
+class PrototypePart:
     """A part, such as "cylinder 2", of a body out of `explorer.motion.chains.BODIES`.
 
     Its vertices (n, 3) are in the frame of the body, in design units; its faces (m, 3) are
@@ -281,17 +281,19 @@ class Part:
         return Mass(own.mass * factor, own.centre * metres, own.inertia * (factor * metres**2))
 
 
-def make_parts(sizes: Sizes) -> tuple[Part, ...]:
+def make_parts(sizes: Sizes) -> tuple[PrototypePart, ...]:
     """Make all parts, the base first."""
     unit = sizes.design.unit_mm
-    return tuple(_part(name, body, shape, unit) for name, body, shape in forms_of(sizes, Kernel()))
+    return tuple(
+        _part(name, body, shape, unit) for name, body, shape in forms_of(sizes, ShapeMaker())
+    )
 
 
-def _part(name: str, body: str, shape: Shape, unit_mm: float) -> Part:
+def _part(name: str, body: str, shape: Shape, unit_mm: float) -> PrototypePart:
     from manifold3d import Error
 
     if shape.status() != Error.NoError:
         raise ExplorerError(f"the {name} cannot be made: manifold3d reports {shape.status().name}")
     mesh: Any = shape.to_mesh64()
     vertices = np.array(mesh.vert_properties, dtype=np.float64)[:, :3] / unit_mm
-    return Part(name, body, vertices, np.array(mesh.tri_verts, dtype=np.int32))
+    return PrototypePart(name, body, vertices, np.array(mesh.tri_verts, dtype=np.int32))

@@ -19,7 +19,8 @@ from explorer.legs.clearance import PAIRS, leg_axes, pair_rows
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.motion.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
-from explorer.workspace.workspace import Workspace
+from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.limits.region import region_of
 
 CLEARANCE = 0.2
 """Clearance between parts that move against each other."""
@@ -43,13 +44,13 @@ _WALL, _SWING, _EYE, _PIN, _NECK, _OVERLAP, _SHAFT = 0.3, 2.6, 1.1, 0.45, 0.45, 
 _RIM = 0.5
 
 
-class Stroke(NamedTuple):
+class StrokeRange(NamedTuple):
     """The shortest and the longest length of an actuator."""
 
     shortest: float
     longest: float
 
-    def covers(self, required: Stroke) -> bool:
+    def covers(self, required: StrokeRange) -> bool:
         """Whether it covers a required stroke, but for the last bits."""
         slack = SLACK * required.longest
         return (
@@ -99,7 +100,7 @@ class LegSizes:
         """Return the distance from its joint within which a leaning leg is below a height."""
         return height * math.tan(FIRST_SWING) + self.outer / math.cos(FIRST_SWING)
 
-    def stroke(self, required: Stroke, home_length: float) -> Stroke:
+    def stroke(self, required: StrokeRange, home_length: float) -> StrokeRange:
         """Return the required stroke, or the part of it that a single rod covers.
 
         A rod no longer than its cylinder can at most double the length of a leg. Of a longer stroke
@@ -109,7 +110,7 @@ class LegSizes:
             required.shortest,
             min((2.0 * home_length + self.dead) / 3.0, 0.5 * (required.longest + self.dead)),
         )
-        return Stroke(shortest, min(required.longest, 2.0 * shortest - self.dead))
+        return StrokeRange(shortest, min(required.longest, 2.0 * shortest - self.dead))
 
 
 class GuideSizes:
@@ -189,10 +190,10 @@ class Sizes:
         """Return the coordinate of a leg's carriage on the guide in the home pose."""
         return float(joints_of_leg(self.home_joints, leg)[0]) * self.design.unit_mm
 
-    def required_stroke(self, leg: int) -> Stroke:
+    def required_stroke(self, leg: int) -> StrokeRange:
         """Return the stroke that the limits of a leg allow."""
         low, high = self.design.length_range(LENGTHS[leg - 1])
-        return Stroke(low * self.design.unit_mm, high * self.design.unit_mm)
+        return StrokeRange(low * self.design.unit_mm, high * self.design.unit_mm)
 
     def nearest_to_a1(self, leg: int) -> float:
         """Return the least distance of a leg's carriage from a1; a pillar stands between."""
@@ -200,13 +201,13 @@ class Sizes:
         return sweep + 2.0 * CLEARANCE + self.guide.pillar + self.radii[leg - 1]
 
     @cached_property
-    def carriage_ranges(self) -> Mapping[int, Stroke]:
+    def carriage_ranges(self) -> Mapping[int, StrokeRange]:
         """The ranges of the carriages along the guide, by their legs.
 
         A range is that of the guide's limits or, without such limits, the range that the
         workspace needs, on the carriage's side of a1.
         """
-        ranges: dict[int, Stroke] = {}
+        ranges: dict[int, StrokeRange] = {}
         for leg in ON_GUIDE:
             home, nearest = self.carriage_at_home(leg), self.nearest_to_a1(leg)
             low, high = self._required_guide_range(leg)
@@ -214,23 +215,23 @@ class Sizes:
                 low = max(low, nearest)
             else:
                 high = min(high, -nearest)
-            ranges[leg] = Stroke(min(low, home), max(high, home))
+            ranges[leg] = StrokeRange(min(low, home), max(high, home))
         return ranges
 
-    def _required_guide_range(self, leg: int) -> Stroke:
+    def _required_guide_range(self, leg: int) -> StrokeRange:
         design, home = self.design, self.design.home_pose
         if design.limits.guide is not None:
             low, high = design.limits.guide
-            return Stroke(low * design.unit_mm, high * design.unit_mm)
-        region = Workspace(design).region
+            return StrokeRange(low * design.unit_mm, high * design.unit_mm)
+        region = region_of(constraints(design, home.rotation))
         shift = float(home.rotation[0, 0]) * (design.b2 if leg == 2 else design.b3)
         low, high = region.low, region.high
         if region.is_flat or not low < high:
             low = high = home.position[0]
-        return Stroke((low + shift) * design.unit_mm, (high + shift) * design.unit_mm)
+        return StrokeRange((low + shift) * design.unit_mm, (high + shift) * design.unit_mm)
 
     @cached_property
-    def rails(self) -> tuple[Stroke, ...]:
+    def rails(self) -> tuple[StrokeRange, ...]:
         """The ends of the shaft, or of two shafts if a1 is between the carriages."""
         ends_by_side: dict[bool, list[float]] = {}
         for leg in ON_GUIDE:
@@ -239,7 +240,7 @@ class Sizes:
             ends_by_side.setdefault(self.carriage_at_home(leg) > 0.0, []).extend(
                 (low - overhang, high + overhang)
             )
-        return tuple(Stroke(min(ends), max(ends)) for ends in ends_by_side.values())
+        return tuple(StrokeRange(min(ends), max(ends)) for ends in ends_by_side.values())
 
     def leg_distances(
         self, position: ArrayLike, rotation: ArrayLike

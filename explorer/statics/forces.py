@@ -24,12 +24,12 @@ class WorstDirection(NamedTuple):
     Attributes:
         direction: Unit vector along the axes of the base, shape (..., 3); NaN in a singular pose.
         actuator: Index of that actuator in `JOINTS`, shape (...).
-        share: Its force over its limit for a force of 1 N, shape (...), in 1/N.
+        utilisation: That of its limit by a force of 1 N, shape (...), in 1/N.
     """
 
     direction: FloatArray
     actuator: IntArray
-    share: FloatArray
+    utilisation: FloatArray
 
 
 def actuator_forces(
@@ -71,16 +71,16 @@ def largest_force(
     over the length of the actuator's row of J⁻ᵀ, its first three entries; 0 in a singular pose.
     The arguments are those of `Configuration` and of `worst_direction`.
     """
-    shares = worst_direction(Configuration(design, position, rotation, tool), most).share
-    return np.divide(1.0, shares, out=np.full(shares.shape, np.inf), where=shares > 0.0)
+    used = worst_direction(Configuration(design, position, rotation, tool), most).utilisation
+    return np.divide(1.0, used, out=np.full(used.shape, np.inf), where=used > 0.0)
 
 
 def worst_direction(configuration: Configuration, most: ArrayLike) -> WorstDirection:
     """Return the direction in which a force at the tool loads an actuator most.
 
     The limits of the actuators to either side, shape (..., 6), in N, may be infinite. The opposite
-    direction is as bad, with a pull for a push. The share is infinite in a singular pose, and zero
-    if no actuator has a limit.
+    direction is as bad, with a pull for a push. The utilisation is infinite in a singular pose, and
+    zero if no actuator has a limit.
 
     Raises:
         InputError: A limit is not positive, or batch axes do not broadcast.
@@ -91,13 +91,13 @@ def worst_direction(configuration: Configuration, most: ArrayLike) -> WorstDirec
     rows = -np.swapaxes(twists[..., :3, :], -1, -2)
     sizes = np.sqrt(np.einsum("...ij,...ij->...i", rows, rows))
     sizes, limits = np.broadcast_arrays(sizes, limits)
-    # A share is infinite in a singular pose, even without a limit.
-    shares = np.full(sizes.shape, np.inf)
-    np.divide(sizes, limits, out=shares, where=np.isfinite(sizes))
-    actuator = np.argmax(shares, axis=-1)
+    # It is infinite in a singular pose, even without a limit.
+    utilisations = np.full(sizes.shape, np.inf)
+    np.divide(sizes, limits, out=utilisations, where=np.isfinite(sizes))
+    actuator = np.argmax(utilisations, axis=-1)
     row = np.take_along_axis(rows, actuator[..., None, None], axis=-2)[..., 0, :]
     size = np.take_along_axis(sizes, actuator[..., None], axis=-1)
     regular = np.isfinite(size) & (size > 0.0)
     direction = np.full(row.shape, np.nan)
     np.divide(row, size, out=direction, where=regular)
-    return WorstDirection(direction, actuator, shares.max(axis=-1))
+    return WorstDirection(direction, actuator, utilisations.max(axis=-1))

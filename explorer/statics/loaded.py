@@ -1,4 +1,4 @@
-"""A design in one pose under a load and weights: forces, shares of the limits, and precision."""
+"""A design in one pose under a load and weights: forces, utilisations, and precision."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ NO_LOAD: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class WorstForce(NamedTuple):
-    """The direction in which a force uses the largest share of a limit.
+    """The direction in which a force has the largest utilisation of a limit.
 
     Attributes:
         direction: Unit vector along the axes of the base, shape (3,); NaN in a singular pose, and
             if no part has a limit.
-        part: Index in `explorer.statics.reactions.LIMITED` of the part with this share.
-        share: The share, of which 1 is the limit; infinite in a singular pose.
+        part: Index in `explorer.statics.reactions.LIMITED` of the part with this utilisation.
+        utilisation: The utilisation; infinite in a singular pose.
     """
 
     direction: FloatArray
     part: int
-    share: float
+    utilisation: float
 
 
 class LoadedPose(Configuration):
@@ -93,7 +93,7 @@ class LoadedPose(Configuration):
 
     @cached_property
     def shares(self) -> FloatArray:
-        """Shares of the limits, shape (12,), in the order of `LIMITED`; 0 without a limit."""
+        """Utilisations of the limits, shape (12,), as in `LIMITED`; 0 without a limit."""
         return limit_shares(self.design, self.reactions)
 
     @cached_property
@@ -120,12 +120,12 @@ class LoadedPose(Configuration):
 
     @property
     def worst(self) -> int:
-        """Index in `LIMITED` of the part with the largest share."""
+        """Index in `LIMITED` of the part with the largest utilisation."""
         return int(self.shares.argmax())
 
     @property
     def share(self) -> float:
-        """The largest share of a limit; infinite in a singular pose."""
+        """The largest utilisation of a limit; infinite in a singular pose."""
         return float(self.shares.max())
 
     @cached_property
@@ -135,20 +135,20 @@ class LoadedPose(Configuration):
 
     @cached_property
     def unit_force(self) -> WorstForce:
-        """A force of 1 N alone at the tool, in the direction that uses the largest share.
+        """A force of 1 N alone at the tool, in the direction of the largest utilisation.
 
         Neither load nor payload act besides; the largest force that all parts hold in every
-        direction is 1 / share.
+        direction is 1 / utilisation.
         """
         bare = msgspec.structs.replace(self.design, payload=Payload())
         return LoadedPose(bare, self.pose, point=self.point).worst_force(1.0)
 
     def worst_force(self, force: float) -> WorstForce:
-        """Return the direction of an added force at the tool, in N, that uses the largest share.
+        """Return the direction of an added force at the tool, in N, of the largest utilisation.
 
         What a limit bounds is linear in the force, or the length of a vector that is, and changes
         with one component of the force only: that along the row of an actuator in J⁻ᵀ. So the
-        largest share is that of one of these six directions or of their opposites.
+        largest utilisation is that of one of these six or of their opposites.
         """
         rows = twists_of_actuators(self)[:3].T
         if not np.isfinite(rows).all():

@@ -1,4 +1,4 @@
-"""All that a load does to the parts of the machine, and the shares of their limits."""
+"""All that a load does to the parts of the machine, and the utilisations of their limits."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.pose import Triple
 from explorer.motion.inverse_jacobian import forces_of, twists_of_actuators
@@ -29,7 +29,8 @@ PART_NAMES = (
 )
 """Words for these parts, in the order of `LIMITED`."""
 
-# Columns of `_signed`: actuators, moments at the carriages, forces across the guide (y, z).
+# Columns of `_limited_reactions` after the actuators: moments at the carriages, and forces across
+# the guide (y, z).
 _MOMENTS, _ACROSS_2, _ACROSS_3 = slice(6, 8), slice(8, 10), slice(10, 12)
 
 
@@ -79,21 +80,27 @@ def reactions(
     known = isinstance(weights, Carried)
     carried = weights if known else carry(configuration, weights or MovingBodies())
     forces = forces_of(configuration, carried.wrench + np.asarray(load, dtype=np.float64))
-    signed = _signed(configuration, forces, carried)
-    across = signed[..., 8:].reshape(*signed.shape[:-1], 2, 2)
+    limited = _limited_reactions(configuration, forces, carried)
+    across = limited[..., 8:].reshape(*limited.shape[:-1], 2, 2)
     return Reactions(
         actuators=forces,
         joints=_joint_forces(configuration, forces, carried),
-        bending=np.abs(signed[..., _MOMENTS]),
+        bending=np.abs(limited[..., _MOMENTS]),
         guide_force=np.sqrt(dot(across, across)),
         spread=_spread(configuration, forces.shape[:-1]),
     )
 
 
-def limit_shares(design: Design, result: Reactions) -> FloatArray:
-    """Return the shares of a design's limits that reactions use, shape (..., 12), as in `LIMITED`.
+@computed_once
+def payload_reactions(configuration: Configuration) -> Reactions:
+    """Return the reactions to the weight of a design's payload alone."""
+    return reactions(configuration, np.zeros(6), MovingBodies().with_payload(configuration.design))
 
-    A share of a part without a limit is 0, unless the pose is singular.
+
+def limit_shares(design: Design, result: Reactions) -> FloatArray:
+    """Return the utilisations of a design's limits by reactions, shape (..., 12), as in `LIMITED`.
+
+    That of a part without a limit is 0, unless the pose is singular.
     """
     push, pull = design.actuators.limits
     values = np.concatenate(
@@ -107,14 +114,14 @@ def limit_shares(design: Design, result: Reactions) -> FloatArray:
     return np.where(is_regular, np.maximum(up, down), np.inf)
 
 
-def shares_in_motion(configuration: Configuration, acceleration: float = 0.0) -> FloatArray:
-    """Return the shares of a design's limits with its payload, (..., 12), as `limit_shares` does.
+def utilisations_in_motion(configuration: Configuration, acceleration: float = 0.0) -> FloatArray:
+    """Return the utilisations with the payload of a design, (..., 12), as `limit_shares` does.
 
     The platform accelerates from rest by as much in the worst direction for each part, in m/s²,
     without turning, as for `largest_accelerations`.
     """
     payload = configuration.design.payload
-    held = reactions(configuration, np.zeros(6), MovingBodies().with_payload(configuration.design))
+    held = payload_reactions(configuration)
     if acceleration:
         effect = _effect(configuration, held.spread.shape[:-1], payload.centre)
         held = held._replace(spread=held.spread + acceleration * payload.mass_kg * effect)
@@ -176,8 +183,8 @@ def largest_payload(
     by_one = forces_of(configuration, kilogram.wrench)
     regular = np.isfinite(at_zero[..., 0])
     at_zero, by_one = np.nan_to_num(at_zero, posinf=0.0), np.nan_to_num(by_one, posinf=0.0)
-    start = _signed(configuration, at_zero, base)
-    slope = _signed(configuration, by_one, kilogram)
+    start = _limited_reactions(configuration, at_zero, base)
+    slope = _limited_reactions(configuration, by_one, kilogram)
     start, slope = np.broadcast_arrays(start, slope)
     highs, lows = part_limits(design)
     spread = _spread(configuration, regular.shape)[..., :10]
@@ -203,7 +210,7 @@ def largest_accelerations(configuration: Configuration) -> FloatArray:
     is not held at rest, −∞ in a singular pose, and infinite for a part without a limit.
     """
     design = configuration.design
-    held = reactions(configuration, np.zeros(6), MovingBodies().with_payload(design))
+    held = payload_reactions(configuration)
     values = np.concatenate([held.actuators, held.bending, held.guide_force], axis=-1)
     regular = np.isfinite(values)
     values = np.where(regular, values, 0.0)
@@ -225,10 +232,10 @@ def _limits(design: Design) -> FloatArray:
     return np.array([bending, bending, force, force, moment, moment])
 
 
-def _signed(c: Configuration, forces: FloatArray, carried: Carried) -> FloatArray:
-    """Return what limits bound, linear in the load, shape (..., 12).
+def _limited_reactions(c: Configuration, forces: FloatArray, carried: Carried) -> FloatArray:
+    """Return the limited reactions with their signs, linear in the load, shape (..., 12).
 
-    It is the actuator forces, the moments at the carriages along the guide, and the (y, z)
+    They are the actuator forces, the moments at the carriages along the guide, and the (y, z)
     components of the forces of both carriages on the guide.
     """
     lengths, along = c.joints[..., STRUT_ROWS], forces[..., GUIDE_ROWS]

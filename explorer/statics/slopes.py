@@ -89,7 +89,7 @@ DISPLACEMENT, TURN = slice(0, 3), slice(3, 6)
 """Rows of twists."""
 
 
-def share_slopes(
+def utilisation_slopes(
     design: Design,
     rotation: FloatArray,
     slopes: TwistSlopes,
@@ -97,10 +97,10 @@ def share_slopes(
     limits: FloatArray,
     is_up: BoolArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return shares of limits, shape (k,), and their derivatives by `PARAMETERS`, shape (k, 10).
+    """Return utilisations, shape (k,), and their derivatives by `PARAMETERS`, shape (k, 10).
 
-    The parts are the index of the position and that of the part for each share, shape (k,) each;
-    the limits (2, 10) are those of `explorer.statics.reactions.part_limits`. Whether the limit of
+    The parts are the index of the position and that of the part for each, shape (k,) each; the
+    limits (2, 10) are those of `explorer.statics.reactions.part_limits`. Whether the limit of
     the largest value is meant, shape (k,), follows from the larger share if it is None.
     """
     row, part = parts
@@ -133,7 +133,7 @@ def acceleration_slopes(
     """Return largest accelerations, shape (k,), in m/s², and derivatives by `PARAMETERS`, (k, 10).
 
     They are those of `explorer.statics.reactions.largest_accelerations` at regular positions
-    (n, 3); the parts are those of `share_slopes`. Derivatives of an infinite one are zero.
+    (n, 3); the parts are those of `utilisation_slopes`. Derivatives of an infinite one are zero.
     """
     own, limits = design.payload, part_limits(design)
     # An acceleration of 1 m/s² does what a force of any direction at the payload's centre does.
@@ -142,8 +142,8 @@ def acceleration_slopes(
     row, part = parts
     force = -held.twists[row, :, ACTUATOR_OF[part]] @ payload_wrench(design, rotation)
     is_up = limits[0, part] - force <= limits[1, part] + force
-    share, share_by = share_slopes(design, rotation, held, parts, limits, is_up)
-    by_one, slope = share_slopes(unit, rotation, moved, parts, limits, is_up)
+    share, share_by = utilisation_slopes(design, rotation, held, parts, limits, is_up)
+    by_one, slope = utilisation_slopes(unit, rotation, moved, parts, limits, is_up)
     loads, by_one, slope = by_one > 0.0, own.mass_kg * by_one, own.mass_kg * slope
     out = np.where(share <= 1.0, np.inf, -np.inf), np.zeros(slope.shape)
     value = np.divide(1.0 - share, by_one, out=out[0], where=loads)
@@ -172,7 +172,7 @@ def deflection_slopes(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest displacements of the tool under the load, (n,), and derivatives, (n, 10).
 
-    The arguments are those of `share_slopes`.
+    The arguments are those of `utilisation_slopes`.
     """
     weight, turned = _weight_and_turn(design, rotation)
     return _moved_by(design, slopes, weight, turned, design.payload.force_n)

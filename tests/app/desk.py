@@ -19,6 +19,7 @@ from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.app.widgets.buttons import Buttons
+from explorer.measures.field_words import message_of
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.page.widgets.assigning import Update
@@ -53,7 +54,7 @@ class Desk:
     def __init__(self, state: State) -> None:
         self.complaints: list[str] = []
         self._drawn = threading.Condition()
-        self.session = Session(state, self._draw, self.complain, self._fail)
+        self.session = Session(state, self._draw, self.complain, self._fail, words_of=message_of)
 
     @property
     def state(self) -> State:

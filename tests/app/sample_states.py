@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, TypeVar, cast, get_args, get_type_hints
 
 import msgspec
 from hypothesis import strategies as st
 
 from explorer.app.features.compare.feature import Pin, Unpin
+from explorer.app.features.compare.state import Look
 from explorer.app.features.optimise.actions import (
     Accept,
     Advance,
@@ -34,15 +35,14 @@ from explorer.app.state.actions import (
     Action,
     GoHome,
     Open,
+    Set,
     SetAngle,
     SetJoint,
     SetMode,
     SetPosition,
     SetVariable,
     UseNearest,
-    check_free,
 )
-from explorer.app.state.compared import Look
 from explorer.app.state.folds import SetFold
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, open_state
@@ -111,7 +111,7 @@ def _view(_: State, i: int, share: float) -> Action:
 
 
 def _limited(state: State, i: int, share: float) -> Action:
-    check_free(state)
+    state.check_free()
     return Change("", {"design": msgspec.structs.replace(state.design, limits=_limits(i, share))})
 
 
@@ -289,7 +289,7 @@ def rich_state() -> State:
         Change("paths", {"drives": "duration", "duration": 0.5}),
         Pin(OPTIMAL),
         Change("compared", {"look": varied(Look())}),
-        Change("", {"studies": varied(Studies())}),
+        Set("studies", varied(Studies())),
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),
         BrushAxes((Brush("volume", ((1 / 3, 10.0),)),)),
@@ -318,7 +318,8 @@ Part = TypeVar("Part")
 def varied(part: Part) -> Part:
     """Return a part of the state in which every value is another one, by its type."""
     types = get_type_hints(type(part))
-    values = {name: _varied(getattr(part, name), kind) for name, kind in types.items()}
+    names = (field.name for field in fields(cast("Any", part)))
+    values = {name: _varied(getattr(part, name), types[name]) for name in names}
     return replace(cast("Any", part), **values)
 
 

@@ -20,17 +20,18 @@ from page_props import shown_by
 from sample_states import iterates_of
 from socket_tab import SocketTab
 
+from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.optimise import runner
 from explorer.app.features.optimise.actions import SetRequest, StartRun
-from explorer.app.features.optimise.state import OptimisationRequest, SearchResult
+from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchResult
 from explorer.app.features.paths.actions import Go, Play
+from explorer.app.features.paths.state import journey_of
 from explorer.app.features.studies.state import Studies
 from explorer.app.features.view.feature import FORMS
 from explorer.app.inputs.controls import MAIN
 from explorer.app.server import Running
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import Open, Set, SetJoint, SetPosition
-from explorer.app.state.compared import SLOTS
 from explorer.app.widgets.buttons import Buttons, extra_button, press_button
 from explorer.files.extras import EXTRAS, LINUX_ALONE, install_command
 from explorer.files.packaged import SOURCES
@@ -57,19 +58,19 @@ def tab(running: Running) -> Generator[SocketTab]:
 def test_press_of_a_client_is_one_step(running: Running, tab: SocketTab) -> None:
     session = running.page.session
     tab.update(*press_update(running, "compare.pin"))
-    wait_for(lambda: session.state.compared.pinned[0] is not None)
+    wait_for(lambda: Compared.of(session.state).pinned[0] is not None)
     number = session.history.step.number
     # The same press again is another press.
     for on in (True, False, True):
         tab.update(*press_update(running, "compare.turn", "Outlines"))
-        wait_for(lambda on=on: session.state.compared.look.outlines is on)
+        wait_for(lambda on=on: Compared.of(session.state).look.outlines is on)
     assert session.history.step.number == number + 3
     assert session.wait_until_idle()
     assert ("compare.open", SLOTS[0]) in presses_in(running)
     for _ in range(4):
         session.do(UNDO)
     assert session.wait_until_idle()
-    assert session.state.compared.is_empty
+    assert Compared.of(session.state).is_empty
 
 
 def test_form_of_the_mechanism_is_chosen_by_a_press_and_given_up_by_another(
@@ -121,7 +122,7 @@ def test_press_that_nothing_offers_does_nothing(running: Running, tab: SocketTab
         tab.update(inbox, text)
     # Presses are handled in their order: once this one is done, so are the others.
     tab.update(*press_update(running, "compare.turn", "Outlines"))
-    wait_for(lambda: session.state.compared.look.outlines)
+    wait_for(lambda: Compared.of(session.state).look.outlines)
     assert session.history.step.number == before + 1
     session.do(UNDO)
 
@@ -204,13 +205,13 @@ def test_each_tab_has_one_filled_button_at_most(running: Running) -> None:
     check_filled(running, "Pose")
     session.do(Open(PRESETS["paper-optimal"]))
     buttons.press("compare.pin", "", CLIENT)
-    wait_for(lambda: not session.state.compared.is_empty)
+    wait_for(lambda: not Compared.of(session.state).is_empty)
     check_filled(running, "Compare")
     buttons.press("studies.start", "", CLIENT)
     wait_for(lambda: Studies.of(session.state).name is not None)
     check_filled(running)
     session.do(Go())
-    wait_for(lambda: session.state.journey is not None)
+    wait_for(lambda: journey_of(session.state) is not None)
     # The page does not come to rest while the path is played.
     session.do(Play(on=False))
     check_filled(running, "Paths")
@@ -225,10 +226,10 @@ def test_search_and_its_answer_leave_one_filled_button_at_most(
     session = running.page.session
     session.do(SetRequest("optimisation.request", ENDLESS))
     session.do(StartRun())
-    wait_for(lambda: session.state.optimisation.is_on)
+    wait_for(lambda: Optimisation.of(session.state).is_on)
     check_filled(running)
     running.page.buttons.press("optimise.cancel", "", CLIENT)
-    wait_for(lambda: not session.state.optimisation.is_on)
+    wait_for(lambda: not Optimisation.of(session.state).is_on)
     check_filled(running)
     (best,) = iterates_of(session.state, 1)
     session.do(Set("optimisation.run.verdict", SearchResult("converged", "", best)))

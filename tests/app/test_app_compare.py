@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from functools import cache
 from html import unescape
 from pathlib import Path
@@ -19,6 +18,7 @@ from services import StubWorker, services_for
 
 from explorer.app.features.compare.feature import ComparePanel, Pin, Unpin
 from explorer.app.features.compare.scene import APART, SCENES
+from explorer.app.features.compare.state import Compared, Look
 from explorer.app.features.compare.table import (
     DRAWN,
     Column,
@@ -42,8 +42,9 @@ from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import COMPARED
 from explorer.app.state.actions import Open, Set, SetVariable
-from explorer.app.state.compared import Look, without_name
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import without_name
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
@@ -59,8 +60,7 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import Unit
 from explorer.page.widgets.assigning import Assigner
 from explorer.statics.loaded import LoadedPose
-from explorer.workspace.slices.volume import node_count_of, workspace_volume
-from explorer.workspace.workspace import Workspace
+from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 
 INITIAL, OPTIMAL = PRESETS.values()
 LISTED = measures_in("compare")
@@ -112,23 +112,27 @@ def test_actions_in_any_order_pin_at_most_three_designs_and_none_twice(
 ) -> None:
     state = open_state(OPTIMAL)
     for kind, index in actions:
-        before, pinned = state, state.compared.pinned
+        before, pinned = state, Compared.of(state).pinned
         if kind == "live":
             state = Open(variant(index)).apply(state)
-            assert state.compared == before.compared
+            assert Compared.of(state) == Compared.of(before)
             continue
         if kind == "unpin":
             state = Unpin(index % 3).apply(state)
             # The others keep their places, and with them their colours.
-            assert state.compared.pinned == (*pinned[: index % 3], None, *pinned[index % 3 + 1 :])
+            assert Compared.of(state).pinned == (
+                *pinned[: index % 3],
+                None,
+                *pinned[index % 3 + 1 :],
+            )
         elif variant(index) in pinned or None not in pinned:
             with pytest.raises(InputError, match=r"is pinned already, as|A, B, C are taken; unpin"):
                 Pin(variant(index)).apply(state)
         else:
             state = Pin(variant(index)).apply(state)
-            assert state.compared.pinned[pinned.index(None)] == variant(index)
-        assert len(state.compared.pinned) == 3
-        assert replace(state, compared=before.compared) == before
+            assert Compared.of(state).pinned[pinned.index(None)] == variant(index)
+        assert len(Compared.of(state).pinned) == 3
+        assert with_value(state, "compared", Compared.of(before)) == before
     renamed = msgspec.structs.replace(variant(2), name="other")
     with pytest.raises(InputError, match=r"^other is pinned already, as A; change it, or pin"):
         Pin(renamed).apply(compared(variant(2)))
@@ -145,7 +149,7 @@ def test_table_shows_the_values_of_the_library(*, millimetres: bool) -> None:
     large = 1e-3 if millimetres else 1.0
     for place, design in enumerate((OPTIMAL, small, variant(3))):
         factor = design.unit_mm / (1.0 if millimetres else OPTIMAL.unit_mm)
-        nodes = node_count_of(Workspace(design))
+        nodes = workspace_nodes(design)
         expected = {
             f"volume {cubic}": large * workspace_volume(design).volume * factor**3,
             "nodes": nodes.count,
@@ -391,12 +395,12 @@ def test_panel_pins_opens_unpins_and_switches(
         "variant 7 is pinned already, as B",
         "nothing is pinned as C",
     ]
-    assert desk.state.compared.pinned == (own, variant(7), None)
+    assert Compared.of(desk.state).pinned == (own, variant(7), None)
     desk.press(buttons, "compare.turn", "Overlay workspaces")
     desk.press(buttons, "compare.turn", "Bars")
-    assert desk.state.compared.look == Look(shows="bars", overlay=True)
+    assert Compared.of(desk.state).look == Look(shows="bars", overlay=True)
     desk.press(buttons, "compare.unpin", "A")
-    assert desk.state.compared.pinned == (None, variant(7), None)
+    assert Compared.of(desk.state).pinned == (None, variant(7), None)
 
 
 def content_of(panel: ComparePanel, state: State) -> str:
@@ -410,7 +414,7 @@ def test_design_is_pinned_by_one_press(services: Services, desk: Desk) -> None:
     assert re.findall('data-press="compare.pin" data-value="([^"]*)"', words) == ["paper-initial"]
     for name in ("paper-initial", "nothing of this name"):
         desk.press(services.buttons, "compare.pin", name)
-        assert desk.state.compared.pinned == (INITIAL, None, None)
+        assert Compared.of(desk.state).pinned == (INITIAL, None, None)
     # Nor is a design offered that is there already, under whatever name.
     desk.session.do(Open(msgspec.structs.replace(OPTIMAL, name="other")))
     assert 'data-value="paper' not in content_of(panel, desk.state)

@@ -18,12 +18,12 @@ from explorer.app.features.mechanism.feature import DesignPanel
 from explorer.app.features.optimise.actions import EndRun, Revert, StartRun, TakePaperProblem
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchResult
 from explorer.app.features.optimise.work import PAPER_REQUEST
-from explorer.app.session.history import restore, start_history
+from explorer.app.features.paths.state import Paths
+from explorer.app.session.history import start_history
 from explorer.app.state.actions import Open, Reset, Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import ClearMachine, open_geometry, preset_of, set_unit
 from explorer.app.state.parts import value_at, with_value
-from explorer.app.state.paths import Paths
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View
 from explorer.errors import InputError
@@ -81,7 +81,7 @@ def asked() -> State:
         volume=900.0, reach=19.0, clearance=0.3, box=((5.0, 2.0, 7.0), (15.0, 8.0, 11.0)),
         error=0.07, deflection=0.11, tilt=5.0,
     )  # fmt: skip
-    state = replace(open_state(design), paths=Paths(start, goal, "planned", holds_load=True))
+    state = with_value(open_state(design), "paths", Paths(start, goal, "planned", holds_load=True))
     state = with_value(state, "optimisation.request", request)
     for path, value in (
         ("view.warn_below", 1.7),
@@ -119,7 +119,7 @@ def test_presets_and_unit_of_the_page_keep_payload_actuators_and_demands(
         named[getattr(handle, "label", "")] = handle
     asked = with_value(asked, "optimisation.request.box", ((5.0, 2.0, 7.0), (25.0, 8.0, 11.0)))
     desk.session.do(Open(asked.design))
-    desk.session.do(Set("optimisation", asked.optimisation))
+    desk.session.do(Set("optimisation", Optimisation.of(asked)))
     desk.session.do(Set("view", asked.view))
     for label, value in (("Preset", "paper-initial"), ("1 unit (mm)", 40.0)):
         desk.use(named[label], value)
@@ -140,7 +140,7 @@ def test_preset_changes_the_geometry_alone(asked: State) -> None:
     assert after.design.limits.leg_radii == asked.design.limits.leg_radii
     assert (after.pose, after.base) == (INITIAL.home_pose, after.design)
     assert after.view == asked.view
-    assert after.paths == asked.paths
+    assert Paths.of(after) == Paths.of(asked)
     assert Optimisation.of(after).request == Optimisation.of(asked).request
     assert preset_of(after.design) == "paper-initial"
     assert preset_of(SetVariable("b2", 2.5).apply(after).design) is None
@@ -193,7 +193,7 @@ def test_file_brings_its_machine_and_what_was_asked_stays_in_its_millimetres(ask
 def test_undo_of_another_unit_keeps_what_is_shown(asked: State) -> None:
     history = start_history(asked)
     present = with_unit(asked, 40.0)
-    assert restore(history, present)[0] == asked
+    assert history.restore(present).step.state == asked
 
 
 def test_paper_problem_keeps_the_machine_but_for_the_radii(asked: State) -> None:
@@ -258,6 +258,6 @@ def test_result_that_is_given_up_after_another_unit_leaves_what_was_shown(asked:
     end = EndRun(1, SearchResult("converged", "It ended.", iterates[-1]), iterates)
     other = with_unit(end.apply(state), 40.0)
     back = Revert().apply(other)
-    assert (back.design, back.pose, back.paths) == (asked.design, asked.pose, asked.paths)
+    assert (back.design, back.pose, Paths.of(back)) == (asked.design, asked.pose, Paths.of(asked))
     found, expected = millimetres(back), millimetres(asked)
     assert found == pytest.approx(expected, rel=1e-14)

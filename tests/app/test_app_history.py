@@ -21,6 +21,7 @@ from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
 from explorer.app.features.optimise.state import Optimisation, SearchResult
 from explorer.app.features.paths.actions import Advance, Go, Play, SetPathTime
 from explorer.app.features.paths.panel import CANCEL
+from explorer.app.features.paths.state import journey_of
 from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.server import Running
@@ -29,9 +30,7 @@ from explorer.app.session.history import (
     PAUSE_SECONDS,
     History,
     UserAction,
-    restore,
     start_history,
-    state_of_step,
 )
 from explorer.app.session.session import REDO, UNDO, move_to
 from explorer.app.state.actions import (
@@ -95,7 +94,8 @@ class Recorder:
         self.history = self.history.record(event, self.state)
 
     def move(self, steps: int) -> None:
-        self.state, self.history = restore(self.history.move(steps), self.state)
+        self.history = self.history.move(steps).restore(self.state)
+        self.state = self.history.step.state
 
     @property
     def words(self) -> list[str]:
@@ -120,7 +120,7 @@ def test_history_undoes_and_redoes_every_step_exactly(
         except ExplorerError:
             continue
         # The step holds the state that the page shows.
-        assert recorder.history.step.state == state_of_step(recorder.state)
+        assert recorder.history.step.state == recorder.state.for_step()
         assert recorder.history.step.words
         assert recorder.history.at == len(recorder.history.steps) - 1
     before, steps = recorder.history, recorder.history.steps
@@ -130,7 +130,7 @@ def test_history_undoes_and_redoes_every_step_exactly(
     for step, expected, refusal in ((-1, states[-2::-1], "undo"), (1, states[1:], "redo")):
         for state in expected:
             recorder.move(step)
-            assert state_of_step(recorder.state) == state
+            assert recorder.state.for_step() == state
         with pytest.raises(InputError, match=f"nothing to {refusal}"):
             recorder.move(step)
     for step in steps:
@@ -201,12 +201,12 @@ def test_playing_path_belongs_to_the_step_that_began_it(recorder: Recorder) -> N
     for _ in range(5):
         recorder.do(Advance(0.3), "player", 1.0)
     assert len(recorder.words) == 1
-    journey = recorder.history.step.state.journey
+    journey = journey_of(recorder.history.step.state)
     assert journey is not None
     assert journey.at == pytest.approx(1.5)
     assert not journey.is_playing
     recorder.move(-1)
-    assert state_of_step(recorder.state) == state_of_step(open_state(OPTIMAL))
+    assert recorder.state.for_step() == open_state(OPTIMAL).for_step()
 
 
 def test_search_is_one_step_and_no_step_is_undone_meanwhile() -> None:
@@ -247,11 +247,11 @@ def test_session_undoes_and_redoes_exactly(desk: Desk) -> None:
     last = desk.state
     for _ in range(4):
         desk.session.do(UNDO)
-    assert desk.state == state_of_step(first)
+    assert desk.state == first.for_step()
     assert desk.complaints == ["there is nothing to undo"]
     for _ in range(3):
         desk.session.do(REDO)
-    assert state_of_step(desk.state) == state_of_step(last)
+    assert desk.state.for_step() == last.for_step()
     desk.session.do(move_to(1))
     assert desk.state.design.variables[0] == 15.0
 
@@ -300,7 +300,7 @@ def test_what_is_shown_is_no_step_and_undo_leaves_it(done: list[Action | str]) -
         assert recorder.state.view == view
         assert recorder.history.step.state.view == view
         assert recorder.words == alone.words
-        assert state_of_step(recorder.state) == state_of_step(replace(alone.state, view=view))
+        assert recorder.state.for_step() == replace(alone.state, view=view).for_step()
 
 
 def test_every_action_has_words() -> None:

@@ -30,11 +30,12 @@ from explorer.app.inputs.ranges import (
     tint_marks,
     variable_span,
 )
-from explorer.app.session.session import FIELD_WORDS, UNDO, message_of
+from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetJoint, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
 from explorer.errors import DesignError
+from explorer.measures.field_words import FIELD_WORDS, message_of
 from explorer.mechanism.design import JOINTS, VARIABLES, Design, Limits
 from explorer.mechanism.design_file import PRESETS, decode_design
 from explorer.numerics.number_text import Unit

@@ -83,6 +83,7 @@ from explorer.app.state.actions import (
 )
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import set_unit
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View
 from explorer.app.storage.user_data import open_user_data
@@ -97,10 +98,9 @@ from explorer.optimise.outcome import Iterate, compare_designs, curves_of
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
 from explorer.optimise.search.sqp import Trail
 from explorer.page.session.worker import Channel
-from explorer.workspace.limits.constraints import slacks
+from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.table import GAP
 from explorer.workspace.slices.volume import workspace_volume
-from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -156,9 +156,8 @@ def best_of(run: SearchRun) -> Iterate:
 def mechanism_of(state: State) -> State:
     """Return all of a state that belongs to the mechanism."""
     fresh = open_state(OPTIMAL)
-    return replace(
-        state, view=fresh.view, hold=fresh.hold, optimisation=fresh.optimisation, gesture=None
-    )
+    plain = with_value(state, "optimisation", Optimisation.of(fresh))
+    return replace(plain, view=fresh.view, hold=fresh.hold, gesture=None)
 
 
 def buttons_of(state: State) -> dict[str, str]:
@@ -227,13 +226,13 @@ class Bench(Desk):
         """Start a search, wait for some iterates, and return the number of its process."""
         self.do(Open(paper_start()), SetRequest("optimisation.request", request))
         self.push(START)
-        self.wait(lambda s: s.optimisation.is_on and len(run_of(s).iterates) >= iterates)
+        self.wait(lambda s: Optimisation.of(s).is_on and len(run_of(s).iterates) >= iterates)
         process = self.optimiser.worker.process_id
         assert process is not None
         return process
 
     def wait_for_end(self) -> SearchRun:
-        return run_of(self.wait(lambda state: not state.optimisation.is_on))
+        return run_of(self.wait(lambda state: not Optimisation.of(state).is_on))
 
 
 @pytest.fixture(scope="module")
@@ -257,7 +256,7 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     assert problem_of(asked) == paper_problem()
     assert filled_buttons(asked) == [START]
     bench.push(START)
-    run = run_of(bench.wait(lambda s: s.optimisation.own is not None and not s.optimisation.is_on))
+    run = run_of(bench.wait(lambda s: Optimisation.of(s).run is not None and not s.busy))
     assert run.has_converged
     best = best_of(run)
     assert best.value <= 1e-6
@@ -270,7 +269,7 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     assert got[1].values == pytest.approx(known[1].values, rel=1e-6)
     # Iterates are drawn in their order, all of them if they are few.
     steps = [each.design.variables for each in run.iterates]
-    drawn = [each.design.variables for each in bench.states if each.optimisation.is_on]
+    drawn = [each.design.variables for each in bench.states if each.busy]
     places = [steps.index(each) for each in dict.fromkeys(drawn)]
     assert places == sorted(places)
     assert len(places) >= min(len({*steps}), optimiser.STEPS)
@@ -476,7 +475,7 @@ def test_suggested_values_suit_the_design(name: str) -> None:
     assert (lows < home.position).all()
     assert (home.position < highs).all()
     for corner in corners_of(box):
-        assert slacks(Workspace(design, home.rotation).limits, corner).min() >= 0.0
+        assert slacks(constraints(design, home.rotation), corner).min() >= 0.0
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -487,7 +486,7 @@ def test_default_demands_can_be_kept_by_every_preset(name: str, objective: Any) 
     state = ask(OptimisationRequest(objective=objective), open_state(design))
     assert find_refusals(state) == ()
     assert liftable_limits(state) == ()
-    assert StartRun().apply(state).optimisation.is_on
+    assert StartRun().apply(state).busy
 
 
 @pytest.mark.parametrize(

@@ -53,12 +53,12 @@ from explorer.app.features.paths.plots import (
     incidence_columns,
     margins_in,
 )
+from explorer.app.features.paths.state import STRAIGHT_SECONDS, End, Journey, Paths, journey_of
 from explorer.app.features.paths.work import DrivesRequest, draw_drives, request_for
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Action, Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
-from explorer.app.state.parts import value_at
-from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
+from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
@@ -89,8 +89,8 @@ class Bench(Desk):
         self.runner = PathRunner(services_for(session=self.session, tell=self.reports.append))
 
     def draw(self, frame: Frame) -> None:
-        if frame.state.journey is not None:
-            self.times.append(frame.state.journey.at)
+        if (journey := journey_of(frame.state)) is not None:
+            self.times.append(journey.at)
         self.runner.follow(frame)
 
     def do(self, *actions: Action) -> None:
@@ -98,7 +98,7 @@ class Bench(Desk):
             self.session.do(action)
 
     def wait_for_plan(self, request: int) -> State:
-        return self.wait(lambda s: s.paths.request == request and not s.paths.is_planning)
+        return self.wait(lambda s: Paths.of(s).request == request and not Paths.of(s).is_planning)
 
 
 @pytest.fixture
@@ -110,16 +110,17 @@ def bench() -> Generator[Bench]:
 
 
 def with_ends(state: State, start: End = None, goal: End = None) -> State:
-    return replace(state, paths=replace(state.paths, start=start, goal=goal))
+    return with_value(state, "paths", replace(Paths.of(state), start=start, goal=goal))
 
 
 def start_between(first: int, last: int, pose: Pose = TILTED) -> State:
     return Go().apply(with_ends(open_state(OPTIMAL, pose), first, last))
 
 
-def journey_of(state: State) -> Journey:
-    assert state.journey is not None
-    return state.journey
+def path_of(state: State) -> Journey:
+    journey = journey_of(state)
+    assert journey is not None
+    return journey
 
 
 def to_plan(goal: Pose = GOAL) -> State:
@@ -135,7 +136,7 @@ def test_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
     first: int, last: int
 ) -> None:
     state = start_between(first, last)
-    journey = journey_of(state)
+    journey = path_of(state)
     joints = joints_of(OPTIMAL, TILTED)
     modes = forward(OPTIMAL, joints)
     for pose, mode in zip(journey.poses, (first, last), strict=True):
@@ -160,7 +161,7 @@ def test_straight_path_leads_between_any_two_ends(start: End, goal: End) -> None
     before = with_ends(open_state(OPTIMAL, TILTED), start, goal)
     expected = ends_of(before)
     state = Go().apply(before)
-    journey = journey_of(state)
+    journey = path_of(state)
     assert (journey.kind, journey.poses) == ("straight", expected)
     assert journey.poses[0] == (TILTED if start is None else expected[0])
     if isinstance(goal, Pose):
@@ -173,7 +174,7 @@ def test_goal_is_the_neighbouring_mode_until_one_is_chosen_and_stays_once_it_is_
     state = open_state(OPTIMAL)
     assert (state.mode, goal_of(state)) == (1, 5)
     end = SetPathTime(STRAIGHT_SECONDS).apply(Go().apply(state))
-    assert (end.mode, end.paths.goal, goal_of(end)) == (5, 5, 5)
+    assert (end.mode, Paths.of(end).goal, goal_of(end)) == (5, 5, 5)
 
 
 @pytest.mark.parametrize(
@@ -199,11 +200,11 @@ def test_path_between_poses_that_differ_by_rounding_is_refused() -> None:
 def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
     state = SetPathTime(0.3 * STRAIGHT_SECONDS).apply(start_between(1, 4))
     again = Go().apply(state)
-    for pose, before in zip(journey_of(again).poses, journey_of(state).poses, strict=True):
+    for pose, before in zip(path_of(again).poses, path_of(state).poses, strict=True):
         np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
     # But elsewhere those of the present pose.
     elsewhere = Go().apply(SetPosition(0, 9.0).apply(state))
-    assert journey_of(elsewhere).poses[0] != journey_of(state).poses[0]
+    assert path_of(elsewhere).poses[0] != path_of(state).poses[0]
     # A path whose ends have other leg lengths gives its own place no other legs.
     free = SetPathTime(4.0).apply(Go().apply(with_ends(open_state(OPTIMAL, TILTED), None, GOAL)))
     modes = forward(OPTIMAL, joints_of(OPTIMAL, free.pose))
@@ -213,14 +214,14 @@ def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
 def test_path_is_of_its_design() -> None:
     state = start_between(1, 5)
     other = SetVariable("b2", 2.7).apply(state)
-    assert other.journey is None
+    assert journey_of(other) is None
     heavier = Set("design.payload.mass_kg", 2.0).apply(state)
-    assert journey_of(heavier) == replace(journey_of(state), design=heavier.design)
+    assert path_of(heavier) == replace(path_of(state), design=heavier.design)
     for action in (SetPathTime(1.0), Play(True)):
         with pytest.raises(InputError, match="no path for this design"):
             action.apply(other)
     assert Advance(1.0).apply(other) is other
-    assert SetVariable("b2", OPTIMAL.b2).apply(other).journey == state.journey
+    assert journey_of(SetVariable("b2", OPTIMAL.b2).apply(other)) == path_of(state)
 
 
 # Playing
@@ -228,19 +229,19 @@ def test_path_is_of_its_design() -> None:
 
 def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
     state = start_between(1, 5)
-    duration = journey_of(state).trajectory.duration
+    duration = path_of(state).trajectory.duration
     assert duration == pytest.approx(STRAIGHT_SECONDS)
     for _ in range(4):
         state = Advance(0.3 * duration).apply(state)
-        assert state.pose == journey_of(state).pose
-    assert (journey_of(state).at, journey_of(state).is_playing) == (duration, False)
+        assert state.pose == path_of(state).pose
+    assert (path_of(state).at, path_of(state).is_playing) == (duration, False)
     assert Advance(1.0).apply(state) is state
     again = Play(True).apply(state)
-    assert (journey_of(again).at, journey_of(again).is_playing) == (0.0, True)
+    assert (path_of(again).at, path_of(again).is_playing) == (0.0, True)
     paused = Play(False).apply(Advance(1.0).apply(again))
-    assert (journey_of(paused).at, journey_of(paused).is_playing) == (1.0, False)
-    assert journey_of(SetPathTime(1e9).apply(paused)).at == duration
-    assert journey_of(SetPathTime(-1.0).apply(paused)).at == 0.0
+    assert (path_of(paused).at, path_of(paused).is_playing) == (1.0, False)
+    assert path_of(SetPathTime(1e9).apply(paused)).at == duration
+    assert path_of(SetPathTime(-1.0).apply(paused)).at == 0.0
     with pytest.raises(InputError, match="finite"):
         SetPathTime(float("nan")).apply(paused)
 
@@ -248,8 +249,10 @@ def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
 def test_runner_plays_in_real_time_until_it_is_paused(bench: Bench) -> None:
     began = time.monotonic()
     bench.do(Go())
-    state = bench.wait(lambda state: state.journey is not None and state.journey.at > 0.1)
-    assert journey_of(state).at <= time.monotonic() - began
+    state = bench.wait(
+        lambda state: Paths.of(state).journey is not None and path_of(state).at > 0.1
+    )
+    assert path_of(state).at <= time.monotonic() - began
     bench.do(Play(False))
     paused = bench.state
     assert Advance(1.0).apply(paused) is paused
@@ -276,7 +279,7 @@ def margins_of(pose: Pose) -> FloatArray:
 def test_chart_shows_margins_or_folds_of_the_poses_over_time(
     quantity: Quantity, value_of: Callable[[Pose], FloatArray], first: int, last: int
 ) -> None:
-    journey = journey_of(SetPathTime(3.0).apply(start_between(first, last)))
+    journey = path_of(SetPathTime(3.0).apply(start_between(first, last)))
     x, *curves, singular, now = incidence_columns(journey, quantity)
     assert (np.diff(x) >= 0.0).all()
     shown, is_singular = np.stack(curves, axis=1), np.isfinite(singular)
@@ -303,9 +306,9 @@ def test_path_and_its_crossings_are_drawn(services: Services) -> None:
     drawn = {(h.name, n): v for h, n, v in scene.updates(Placed(Frame(state)))}
     scale = Placed(Frame(state)).scale
     line: Any = drawn["/path/line", "points"]
-    ends = [journey_of(state).poses[i].position for i in (0, -1)]
+    ends = [path_of(state).poses[i].position for i in (0, -1)]
     np.testing.assert_allclose([line[0, 0], line[-1, 1]], scale * np.array(ends), atol=1e-4)
-    crossings = journey_of(state).margins.crossings
+    crossings = path_of(state).margins.crossings
     balls: Any = drawn["/path/crossings", "batched_positions"]
     expected = scale * np.array([c.pose.position for c in crossings])
     np.testing.assert_allclose(balls[: len(crossings)], expected, atol=1e-4)
@@ -324,12 +327,12 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     bench.do(Set("design.limits", with_radius(OPTIMAL, 0.2).limits))
     bench.do(Set("paths.goal", GOAL), Set("paths.kind", "planned"), Go())
     state = bench.wait_for_plan(1)
-    assert state.paths.problem is None
-    journey = journey_of(state)
+    assert Paths.of(state).problem is None
+    journey = path_of(state)
     assert journey.kind == "planned"
     assert (journey.poses[0], journey.poses[-1]) == (open_state(OPTIMAL).pose, GOAL)
     # It is played at once, as a straight one.
-    assert bench.wait(lambda state: journey_of(state).at > 0.0).pose != GOAL
+    assert bench.wait(lambda state: path_of(state).at > 0.0).pose != GOAL
     assert not journey.margins.crossings
     least = np.array(journey.margins.least)
     closest = int(least.argmin())
@@ -342,16 +345,18 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     # A plan that would never be ready.
     os.kill(process, signal.SIGSTOP)
     bench.do(SetPose(open_state(OPTIMAL).pose), Go())
-    assert "Planning, for 2 s at most" in str(plan_words(bench.wait(lambda s: s.paths.is_planning)))
+    assert "Planning, for 2 s at most" in str(
+        plan_words(bench.wait(lambda s: Paths.of(s).is_planning))
+    )
     bench.do(CANCEL)
     bench.wait_for_plan(2)
     assert bench.runner.worker.wait_until_idle(60.0)
-    assert bench.state.paths.problem is None
+    assert Paths.of(bench.state).problem is None
     # Cancelled before it was begun, it leaves the process.
     with suppress(ProcessLookupError):
         os.kill(process, signal.SIGCONT)
     bench.do(Go())
-    assert journey_of(bench.wait_for_plan(3)).poses[-1] == GOAL
+    assert path_of(bench.wait_for_plan(3)).poses[-1] == GOAL
     assert bench.complaints == bench.reports == []
 
 
@@ -364,10 +369,9 @@ def test_plan_that_comes_late_or_for_another_design_is_not_taken() -> None:
     changed = SetVariable("b2", 2.7).apply(state)
     after = TakePlan(1, journey, None).apply(changed)
     assert after.pose == changed.pose
-    assert after.paths.problem is not None
-    assert "design has changed" in after.paths.problem
+    assert "design has changed" in str(Paths.of(after).problem)
     failed = TakePlan(1, None, DIED).apply(state)
-    assert failed.paths.problem == DIED
+    assert Paths.of(failed).problem == DIED
 
 
 # The panel
@@ -390,24 +394,24 @@ def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) ->
 
     assert values_of(time_slider)["disabled"] is True
     desk.click(paths.go)
-    assert journey_of(desk.state).is_playing
+    assert path_of(desk.state).is_playing
     slider = values_of(time_slider)
     assert slider["disabled"] is False
     assert slider["max"] == pytest.approx(STRAIGHT_SECONDS, abs=0.011)
     desk.press(buttons, "paths.play", "off")
-    assert not journey_of(desk.state).is_playing
+    assert not path_of(desk.state).is_playing
     desk.press(buttons, "paths.play", "on")
-    assert journey_of(desk.state).is_playing
+    assert path_of(desk.state).is_playing
     for name, value in slider.items():
         setattr(time_slider, name, value)
     desk.use(time_slider, 2.5)
-    assert journey_of(desk.state).at == 2.5
-    assert desk.state.pose == journey_of(desk.state).pose
+    assert path_of(desk.state).at == 2.5
+    assert desk.state.pose == path_of(desk.state).pose
     desk.press(buttons, "paths.export")
     assert isinstance(services.downloads, StubDownloads)
     assert services.downloads.sent == [(1, "paper-optimal-path.csv")]
     # Its lengths are in the unit that the page shows.
-    course = journey_of(desk.state).trajectory
+    course = path_of(desk.state).trajectory
     for lengths, unit, factor in (("mm", "mm", 10.0), ("design units", "10 mm", 1.0)):
         desk.session.do(Set("view.lengths", lengths))
         desk.press(buttons, "paths.export")
@@ -416,14 +420,14 @@ def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) ->
             factor * course.joints[:, 0], rel=1e-15
         )
     desk.press(buttons, "paths.clear")
-    assert desk.state.journey is None
+    assert journey_of(desk.state) is None
     desk.press(buttons, "paths.kind", "planned")
     desk.session.do(Set("paths.goal", GOAL))
     desk.click(paths.go)
-    assert desk.state.paths.is_planning
+    assert Paths.of(desk.state).is_planning
     assert values_of(paths.go) == {"disabled": True}
     desk.press(buttons, "paths.cancel")
-    assert not desk.state.paths.is_planning
+    assert not Paths.of(desk.state).is_planning
 
 
 @pytest.mark.parametrize("end", ENDS)
@@ -540,21 +544,21 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     poses = task(*arguments).poses
     weights = weights_of_parts((PRESS, 3000.0)).with_payload(PRESS)
     along = path_loads(PRESS, poses, state.load, tool=state.tool, weights=weights)
-    assert 0.5 < along.share <= 1.0 + 1e-4
+    assert 0.5 < along.utilisation <= 1.0 + 1e-4
 
 
 def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     state = straight(Set("view.at", "tool"))
-    journey = journey_of(state)
+    journey = path_of(state)
     found = LoadPlot(services).shares(Frame(state))
     assert found is not None
     expected = path_loads(PRESS, journey.poses, state.load, tool=journey.tool)
-    np.testing.assert_array_equal(found.path.shares, expected.shares)
+    np.testing.assert_array_equal(found.path.utilisations, expected.utilisations)
     timed = journey.trajectory
     np.testing.assert_allclose(np.interp(found.time, timed.time, timed.at), expected.at, atol=1e-9)
     pose = journey.pose_at(found.seconds)
     here = path_loads(PRESS, (pose, pose), state.load)
-    assert (here.share, here.part) == (pytest.approx(expected.share), expected.part)
+    assert (here.utilisation, here.part) == (pytest.approx(expected.utilisation), expected.part)
 
 
 # Speeds and forces along the path
@@ -573,7 +577,7 @@ def test_drives_of_the_path_are_requested_once_it_is_there_and_wanted() -> None:
     assert request_for(Go().apply(state)) is None
     design, path = drives_request(Go().apply(wanted))
     assert design == OPTIMAL
-    assert path.poses == journey_of(Go().apply(state)).poses
+    assert path.poses == path_of(Go().apply(state)).poses
     assert path.duration == 1.0
     shortest = Set("paths.drives", "shortest").apply(Go().apply(wanted))
     assert drives_request(shortest)[1].duration is None

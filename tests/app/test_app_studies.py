@@ -61,6 +61,7 @@ from explorer.app.features.studies.work import StudyRunner
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import open_state
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
@@ -341,7 +342,7 @@ def feed(home: Path) -> Generator[StudyFeed]:
 
 
 def draw_study(feed: StudyFeed, studies: Studies) -> StudyDrawing:
-    feed.follow(Frame(replace(open_state(OPTIMAL), studies=studies)))
+    feed.follow(Frame(with_value(open_state(OPTIMAL), "studies", studies)))
     assert feed.wait_until_idle(PATIENCE)
     assert feed.problem is None
     assert feed.drawing is not None
@@ -525,12 +526,12 @@ def test_plots_are_not_drawn_again_for_a_live_design_and_a_lost_study_is_reporte
 ) -> None:
     studies = Studies(name="some")
     drawing = draw_study(feed, studies)
-    state = replace(open_state(OPTIMAL), studies=studies)
+    state = with_value(open_state(OPTIMAL), "studies", studies)
     feed.follow(Frame(SetVariable("b3", 5.0).apply(state)))
     feed.follow(Frame(Set("studies.plan", QUICK).apply(state)))
     assert feed.wait_until_idle(PATIENCE)
     assert feed.drawing is drawing
-    feed.follow(Frame(replace(open_state(OPTIMAL), studies=Studies(name="gone"))))
+    feed.follow(Frame(with_value(open_state(OPTIMAL), "studies", Studies(name="gone"))))
     assert feed.wait_until_idle(PATIENCE)
     assert feed.problem == "there is no study 'gone'; there are some"
     assert feed.drawing is None

@@ -24,6 +24,7 @@ from workspace_feeds import draw
 
 from explorer.app.features.compare.feature import Pin
 from explorer.app.features.compare.scene import SCENES
+from explorer.app.features.compare.state import Look
 from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.feature import MovePanel
@@ -34,6 +35,7 @@ from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, SetTi
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.feature import PathScene
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
+from explorer.app.features.paths.state import Paths, journey_of
 from explorer.app.features.sharing.scene_files import caption_of
 from explorer.app.features.singularity.feature import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
@@ -58,7 +60,6 @@ from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetAngle, SetMode, SetPose, SetPosition
-from explorer.app.state.compared import Look
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
@@ -71,7 +72,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Assigner
-from explorer.workspace.workspace import Workspace
+from explorer.workspace.limits.constraints import constraints
 
 OPTIMAL = PRESETS["paper-optimal"]
 TOOL: Triple = (1.0, 0.0, 3.0)
@@ -264,13 +265,13 @@ def test_ball_is_about_the_tool_and_touches_where_the_tool_is_singular(
 def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
     state = state_at(pose=None)
     state = Go().apply(Set("paths.goal", TILTED).apply(state))
-    journey = state.journey
+    journey = journey_of(state)
     assert journey is not None
     placed = Placed(Frame(state))
     points = by_name(PathScene(services).updates(placed))["/path/line"]["points"]
     timed = journey.trajectory
     read = decode_session(encode_session(start_history(state)), "file").step.state
-    assert (read.view.at, read.journey) == ("tool", replace(journey, is_playing=False))
+    assert (read.view.at, journey_of(read)) == ("tool", replace(journey, is_playing=False))
     # It goes straight, and ends are kept.
     along = points[-1, 1] - points[0, 0]
     off = np.cross(points[:, 0] - points[0, 0], along / np.linalg.norm(along))
@@ -283,7 +284,7 @@ def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
         )
     # The choice of another point changes the line that is drawn and no move.
     of_b4 = Set("view.at", "b4").apply(state)
-    assert of_b4.journey == journey
+    assert journey_of(of_b4) == journey
     points = by_name(PathScene(services).updates(Placed(Frame(of_b4))))["/path/line"]["points"]
     expected = placed.scale * timed.position[:-1]
     np.testing.assert_allclose(points[:, 0], expected, rtol=0.0, atol=1e-5)
@@ -300,7 +301,7 @@ def test_typed_end_of_a_path_is_where_the_tool_is(services: Services, desk: Desk
         return {widget.label: widget.handle for widget in widgets(services.server)}
 
     def typed() -> State:
-        pose = getattr(desk.state.paths, end.lower())
+        pose = getattr(Paths.of(desk.state), end.lower())
         assert isinstance(pose, Pose)
         return replace(desk.state, pose=pose)
 
@@ -580,7 +581,7 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
             if at == "tool":
                 points = points - home.rotation @ np.array(design.tool.position)
             for p in points[:: len(points) // 50]:
-                slack = min(limit.slack(p) for limit in Workspace(design, home.rotation).limits)
+                slack = min(limit.slack(p) for limit in constraints(design, home.rotation))
                 assert abs(float(slack)) < 0.05 * design.reach
             corners = np.asarray(node["vertices"]) + node["position"]
             ends = [corners.min(axis=0), corners.max(axis=0)]

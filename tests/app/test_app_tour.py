@@ -16,6 +16,7 @@ from services import services_for
 from explorer.app.features.help.tour import OVER, STAYS, STEPS, EndTour, Tour, TourGuide
 from explorer.app.features.optimise.actions import Accept, EndRun, StartRun
 from explorer.app.features.optimise.state import Optimisation, SearchResult
+from explorer.app.features.paths.state import Paths
 from explorer.app.state.actions import Action, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
@@ -92,7 +93,7 @@ class TourDesk(Desk):
 
 def parts(state: State) -> tuple[object, ...]:
     """Return what the tour changes of a state."""
-    request, paths = Optimisation.of(state).request, state.paths
+    request, paths = Optimisation.of(state).request, Paths.of(state)
     return state.design, state.base, state.pose, state.joints, state.view, request, paths
 
 
@@ -112,7 +113,7 @@ def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design
             state = apply(step.before)
         assert not tour.after_frame(Frame(state)).is_done
         state = apply(tour.step.show(Frame(state)))
-        if state.optimisation.is_on:
+        if Optimisation.of(state).is_on:
             assert not tour.after_frame(Frame(state)).is_done
             state = EndRun(1, SearchResult("failed", "no answer")).apply(state)
         tour = tour.after_frame(Frame(state))

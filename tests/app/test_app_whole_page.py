@@ -19,6 +19,7 @@ from server_clock import wait_until_drawn
 from explorer.app.features.compare.feature import Pin
 from explorer.app.features.optimise.actions import Accept, SetRequest, StartRun
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest
+from explorer.app.features.paths.state import Paths
 from explorer.app.server import Running
 from explorer.app.state.actions import Action, GoHome, Open, Set, SetAngle, SetPose, SetPosition
 from explorer.app.state.state import State
@@ -58,7 +59,7 @@ def do(running: Running, action: Action) -> None:
     session = running.page.session
     with contextlib.suppress(ExplorerError):
         after = action.apply(session.state)
-        if not after.optimisation.is_on and not after.paths.is_planning:
+        if not Optimisation.of(after).is_on and not Paths.of(after).is_planning:
             session.do(action)
             assert session.wait_until_idle()
 

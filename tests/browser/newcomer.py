@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -29,10 +29,6 @@ SCROLL = """it => {
     const { top, bottom } = it.getBoundingClientRect();
     // A part of a pixel may stay outside, since scrolling goes by whole ones.
     return it.isConnected && top > -1 && bottom < innerHeight + 1;
-}"""
-GROUND = """() => {
-    const { backgroundColor } = getComputedStyle(document.body);
-    return backgroundColor.match(/[\\d.]+/g).slice(0, 3).map(Number);
 }"""
 COLOUR = "it => getComputedStyle(it).color.match(/[\\d.]+/g)?.slice(0, 3).map(Number)"
 
@@ -79,12 +75,6 @@ class Newcomer:
         self.presses += 1
         self._tab.push(words)
 
-    def press_at(self, x: float, y: float) -> None:
-        """Press a point of the page, once it has drawn all that was sent."""
-        self.presses += 1
-        self._tab.settle()
-        self.page.mouse.click(x, y)
-
     def open(self, title: str) -> None:
         """Press a tab of the panels."""
         self.press(title, "tab")
@@ -114,22 +104,6 @@ class Newcomer:
         self.presses += 2
         self.page.get_by_role("combobox", name=words, exact=True).click()
         self.page.get_by_role("option", name=option, exact=True).click()
-
-    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Press at a point of the page, and release at another."""
-        self.presses += 1
-        mouse = self.page.mouse
-        mouse.move(*start)
-        mouse.down()
-        mouse.move(*end, steps=5)
-        mouse.up()
-
-    def drag_slider(self, words: str, pixels: float) -> None:
-        """Drag the thumb of a slider to the right."""
-        self.presses += 1
-        x, y = self._tab.grab(self.page.get_by_role("slider", name=words, exact=True))
-        self.page.mouse.move(x + pixels, y, steps=5)
-        self.page.mouse.up()
 
     def export(self, what: str, file_format: str) -> bytes:
         """Return the file that the dialog Export gives."""
@@ -189,24 +163,10 @@ class Newcomer:
 
         self._tab.wait_for(are_there, f"{values} in sight")
 
-    def lightness(self) -> float:
-        """Return how light the ground of the page is, from 0 to 1."""
-        return sum(self.page.evaluate(GROUND)) / (3 * 255)
-
-    def wait_for_lightness(self, condition: Callable[[float], bool]) -> None:
-        """Wait until the page is as light as a condition says."""
-        self._tab.wait_for(lambda: condition(self.lightness()), "another theme")
-
     def presses_for(self) -> int:
         """Return how many presses there were since the last count, and begin to count anew."""
         presses, self.presses = self.presses, 0
         return presses
-
-    def reload(self) -> None:
-        """Load the page again, once it has drawn all that was sent."""
-        self.presses += 1
-        self._tab.settle()
-        self._tab.reload()
 
 
 def hue(it: Locator) -> float:

@@ -12,6 +12,7 @@ from playwright.sync_api import Browser, FloatRect, Locator
 from tab import Tab
 
 from explorer.app.features.help.tour import STEPS
+from explorer.app.features.optimise.state import Optimisation
 from explorer.app.layout import DRAWER_HEIGHT, NARROW
 from explorer.app.scene.camera import framing
 from explorer.app.screenshot import SCENE_CANVAS
@@ -354,7 +355,7 @@ def test_tour_leads_through_five_steps_once(browser: Browser) -> None:
             button_of(tab, "Next").click()
         # A search that has just begun is cancelled.
         button_of(tab, "Show me").click()
-        tab.wait_for(lambda: tab.state.optimisation.is_on, "a search")
+        tab.wait_for(lambda: Optimisation.of(tab.state).is_on, "a search")
         button_of(tab, "Skip the tour").click()
         tab.page.get_by_text("step 5 of 5").wait_for(state="detached")
         wait_until_back(tab)
@@ -371,7 +372,7 @@ def wait_until_back(tab: Tab) -> None:
         return state.design, state.pose, state.view
 
     tab.wait_for(lambda: parts(tab.state) == parts(first), "what was before the tour")
-    assert not tab.state.optimisation.is_on
+    assert not Optimisation.of(tab.state).is_on
     for name in ("Pose", "Singularity"):
         tab.page.get_by_role("tab", name=name, selected=True).wait_for()
     tab.page.locator("[data-ex=drawer] [data-dock-bar]").wait_for()

@@ -67,38 +67,6 @@ def test_page_loaded_again_shows_and_draws_the_same_and_asks_nobody_else(tab: Ta
     assert tab.complaints() == []
 
 
-def test_mechanism_follows_fields_sliders_and_the_home_button(tab: Tab) -> None:
-    before = tab.state
-    tab.push("Leg lengths")
-    tab.type(LABELS[0], "12.5\n")
-    tab.wait_for(lambda: tab.state.joints[0] == 12.5, "the length that was typed")
-    assert tab.state.joints[1:] == before.joints[1:]
-    assert tab.state.pose != before.pose
-    joints = joints_of(tab.state.design, tab.state.pose)
-    np.testing.assert_allclose(joints, tab.state.joints, atol=1e-9)
-    assert_page_shows_state(tab)
-    before = tab.state
-    tab.push("Leg lengths")
-    goal = tab.drag(LABELS[5], 0.5)
-    tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")
-    assert tab.state.unclosed is None
-    assert tab.state.pose != before.pose
-    assert tab.state.joints[:5] == before.joints[:5]
-    assert_page_shows_state(tab)
-    before = tab.state
-    goal = tab.drag("y", 0.6)
-    tab.wait_for(lambda: abs(tab.state.pose.position[1] - goal) < 0.4, "the y dragged to")
-    assert tab.state.pose.position[::2] == before.pose.position[::2]
-    assert tab.state.joints != before.joints
-    tab.type("roll (°)", "12\n")
-    tab.wait_for(lambda: tab.state.yaw_pitch_roll[2] == 12.0, "the roll that was typed")
-    assert_page_shows_state(tab)
-    tab.push("Home pose")
-    home = tab.state.design.home_pose
-    tab.wait_for(lambda: tab.state.pose == home, "the home pose")
-    assert_page_shows_state(tab)
-
-
 def test_row_of_a_mode_shows_its_ghost_while_it_is_pointed_at_and_is_chosen(tab: Tab) -> None:
     session, hovered = tab.running.page.session, tab.running.page.services.get(mode_hover)
     before, number = tab.state, session.history.step.number

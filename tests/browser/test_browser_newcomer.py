@@ -12,8 +12,9 @@ import pytest
 from limited_designs import scaled_design
 from newcomer import Newcomer, hue, numbers
 from playwright.sync_api import expect
-from tab import Tab, middle
+from tab import Tab
 
+from explorer.app.features.prototype.work import export_simulation
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import SCENE_CANVAS
 from explorer.app.state.actions import Set
@@ -22,6 +23,7 @@ from explorer.app.state.view import View
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.numerics.number_text import format_number
+from explorer.optimise.outcome import decode_record
 from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
@@ -29,14 +31,12 @@ SIZE, LARGER = (1280, 720), (1440, 900)
 # A value of a3x other than that of the paper's optimum, and the design with it.
 A3X = 18.0
 CHANGED = OPTIMAL.with_variables((A3X, *OPTIMAL.variables[1:]))
-READING = re.compile(r"y ([−\d.]+), z ([−\d.]+) mm: min \|δ\| ([\d.]+) \(δ(\d)\)")
 # Texts at the axes of each chart; null for an axis that is not drawn.
 AXIS_TEXTS = """() => {
   const plots = Object.values(window.__viserTestpoints.uplots);
   return plots.map(({ chart }) => chart.axes.map((axis) => axis._values ?? null));
 }"""
 # Pixels below the words of an axis at which it is pressed and released.
-BRUSH = (50.0, 80.0)
 
 
 @pytest.fixture
@@ -58,22 +58,6 @@ def model_in(data: bytes) -> str:
         return archive.read("3D/3dmodel.model").decode()
 
 
-def test_platform_is_moved_by_a_slider_and_by_a_field(newcomer: Newcomer) -> None:
-    x, distance = newcomer.field("x"), newcomer.figure("Nearest singular pose")
-    expect(x).to_have_value("100")
-    before = distance.inner_text()
-    newcomer.drag_slider("x", 12.0)
-    expect(x).not_to_have_value("100")
-    expect(distance).not_to_have_text(before)
-    assert newcomer.presses_for() == 1
-    newcomer.type("z", "75")
-    expect(newcomer.field("z")).to_have_value("75")
-    assert newcomer.presses_for() == 2
-    newcomer.press("Leg lengths")
-    expect(newcomer.field("l1 leg 1")).not_to_have_value("117.4")
-    assert newcomer.presses_for() == 1
-
-
 def test_pose_near_a_singularity_is_named_in_amber_with_its_distance(newcomer: Newcomer) -> None:
     assert 90.0 < hue(newcomer.sees("Clear of singularities")) < 150.0
     newcomer.type("z", "5")
@@ -93,18 +77,6 @@ def test_pose_near_a_singularity_is_named_in_amber_with_its_distance(newcomer: N
     assert newcomer.presses_for() == 1
 
 
-def test_assembly_mode_is_switched_with_the_lengths_kept(newcomer: Newcomer) -> None:
-    newcomer.sees("Mode 1 (− − +)")
-    newcomer.press("Leg lengths")
-    lengths = [newcomer.field(words).input_value() for words in ("l1 leg 1", "d2 leg 2")]
-    newcomer.press("8 modes")
-    newcomer.press("Mode 5, + − +")
-    newcomer.sees("Mode 5 (+ − +)")
-    expect(newcomer.button("Mode 5, + − +")).to_have_attribute("aria-pressed", "true")
-    assert [newcomer.field(words).input_value() for words in ("l1 leg 1", "d2 leg 2")] == lengths
-    assert newcomer.presses_for() <= 3
-
-
 def test_volume_after_a_change_of_the_design_is_in_sight(newcomer: Newcomer) -> None:
     volume = newcomer.figure("Volume")
     expect(volume).to_contain_text(volume_of(OPTIMAL))
@@ -116,41 +88,7 @@ def test_volume_after_a_change_of_the_design_is_in_sight(newcomer: Newcomer) -> 
     assert newcomer.presses_for() == 0
 
 
-def test_workspace_is_cut_in_its_middle_and_a_value_is_read(newcomer: Newcomer) -> None:
-    newcomer.open("Workspace")
-    newcomer.press("x")
-    expect(newcomer.field("Cut at (mm)")).to_have_value(re.compile(r"^100(\.0+)?$"))
-    chart = newcomer.page.get_by_role("img", name="Map of the slice at x = 100 mm")
-    newcomer.wait()
-    chart.scroll_into_view_if_needed()
-    newcomer.page.mouse.move(*middle(chart))
-    newcomer.sees(READING)
-    # Scrolling to the words may have moved the map.
-    newcomer.page.mouse.move(*middle(chart))
-    newcomer.wait()
-    found = READING.search(newcomer.sees(READING).inner_text())
-    assert found is not None
-    assert float(found[3]) > 0.0
-    assert newcomer.presses_for() <= 3
-    # A press goes where the pointer reads.
-    newcomer.press_at(*middle(chart))
-    for words, value in zip(("y", "z"), (found[1], found[2]), strict=True):
-        newcomer.wait_for_field(words, numbers(value)[0])
-
-
-def test_workspace_and_hull_are_exported(newcomer: Newcomer) -> None:
-    solid = model_in(newcomer.export("Workspace", "3MF"))
-    assert solid.count("<triangle ") > 100
-    assert newcomer.presses_for() <= 3
-    assert newcomer.export("Workspace", "STEP").startswith(b"ISO-10303-21;")
-    assert newcomer.presses_for() <= 3
-    hull = model_in(newcomer.export("Convex hull", "3MF"))
-    assert hull.count("<triangle ") > 100
-    assert hull != solid
-    assert newcomer.presses_for() <= 3
-
-
-def test_problem_of_the_paper_is_solved_in_two_presses(newcomer: Newcomer) -> None:
+def test_problem_of_the_paper_is_solved_in_two_presses(newcomer: Newcomer, data_tab: Tab) -> None:
     newcomer.press("The paper's problem")
     newcomer.button("Undo The paper's problem").wait_for()
     expect(newcomer.field("Demanded clearance (mm)")).to_have_value("2")
@@ -173,9 +111,18 @@ def test_problem_of_the_paper_is_solved_in_two_presses(newcomer: Newcomer) -> No
     assert hull.value.suggested_filename == "paper-initial-optimised-hull.3mf"
     assert model_in(Path(hull.value.path()).read_bytes()).count("<triangle ") > 100
     assert newcomer.presses_for() == 1
+    found = data_tab.state.design
+    expect(newcomer.page.locator(".uplot canvas:visible")).to_have_count(3)
+    for words, decode in (("Design", decode_design), ("Record", decode_record)):
+        with newcomer.page.expect_download() as saved:
+            newcomer.press(words)
+        read = decode(Path(saved.value.path()).read_bytes(), words)
+        assert (read if isinstance(read, Design) else read.design).variables == found.variables
+    newcomer.presses_for()
     newcomer.press("Accept")
     newcomer.sees("accepted")
     expect(newcomer.button("Accept")).to_have_count(0)
+    assert data_tab.state.design == found
     assert newcomer.presses_for() == 1
     # What was found cannot be built yet: its carriages are too close together.
     newcomer.sees("Not buildable")
@@ -203,7 +150,7 @@ def test_three_designs_are_compared_by_volume_and_overlay(newcomer: Newcomer) ->
 
 def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.MonkeyPatch) -> None:
     # So long that even a slow browser can stop it on the way.
-    monkeypatch.setattr("explorer.app.state.paths.STRAIGHT_SECONDS", 600.0)
+    monkeypatch.setattr("explorer.app.features.paths.state.STRAIGHT_SECONDS", 600.0)
     newcomer.open("Paths")
     newcomer.choose("Goal", "Mode 7: + + +")
     newcomer.press("Go")
@@ -232,61 +179,15 @@ def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.Monk
     assert newcomer.presses_for() == 7
 
 
-def test_prototype_is_shown_and_exported(newcomer: Newcomer) -> None:
+def test_prototype_is_shown_and_exported(newcomer: Newcomer, data_tab: Tab) -> None:
     newcomer.open("Prototype")
     newcomer.press("Show the parts", "checkbox")
     newcomer.sees("mass, g")
     assert newcomer.presses_for() == 2
     assert model_in(newcomer.export("Mechanism", "3MF")).count("<object ") > 5
     assert newcomer.presses_for() <= 3
-
-
-def test_study_is_started_brushed_and_a_design_of_it_picked(newcomer: Newcomer) -> None:
-    newcomer.open("Studies")
-    newcomer.type("Number of designs", "32")
-    newcomer.sees(re.compile("A new study: 32 designs"))
-    newcomer.press("Start study")
-    newcomer.sees(re.compile("32 designs · .* on the Pareto front"))
-    newcomer.button("New study").wait_for()
-    newcomer.sees(re.compile("^Pareto front: "))
-    # Two of them type the number, so that a first table takes the other two.
-    assert newcomer.presses_for() == 4
-    table = newcomer.export("Study", "CSV").decode().splitlines()
-    assert [line.split(",")[0] for line in table[1:]] == [*map(str, range(32))]
-    assert newcomer.presses_for() == 2
-    newcomer.wait()
-    # The words of an axis stand above its middle.
-    x, y = middle(newcomer.sees("volume [cm³]"))
-    newcomer.drag((x, y + BRUSH[0]), (x, y + BRUSH[1]))
-    within = numbers(newcomer.sees("within the filters").inner_text())
-    assert 0.0 < within[-1] < 32.0
-    newcomer.wait()
-    row = newcomer.button(re.compile(r"^\d+ [\d,]+ "))
-    name, volume = row.inner_text().split()[:2]
-    newcomer.press(re.compile(f"^{name} "))
-    newcomer.wait_for_numbers(newcomer.figure("Volume"), numbers(volume), tolerance=0.5)
-    newcomer.button(re.compile(f" #{name} not saved$")).wait_for()
-    assert newcomer.presses_for() == 2
-
-
-def test_design_is_saved_renamed_reloaded_and_undone(newcomer: Newcomer) -> None:
-    newcomer.type("x", "120")
-    newcomer.press("paper-optimal preset")
-    newcomer.type("Name", "first try")
-    newcomer.press("Save")
-    newcomer.button("first try saved").wait_for()
-    newcomer.type("Name", "second try")
-    newcomer.press("Rename")
-    newcomer.button("second try saved").wait_for()
-    newcomer.button("second try").wait_for()
-    newcomer.key("Escape")
-    newcomer.reload()
-    newcomer.button("second try saved").wait_for()
-    expect(newcomer.field("x")).to_have_value("120")
-    newcomer.type("x", "130")
-    newcomer.press(re.compile("^Undo x = 130 mm"))
-    expect(newcomer.field("x")).to_have_value("120")
-    newcomer.button("second try saved").wait_for()
+    density = data_tab.state.view.prototype.density
+    assert newcomer.export("Simulation", "MJCF") == export_simulation(OPTIMAL, density)
 
 
 def test_mechanism_ten_thousand_times_larger_is_in_sight_and_again_after_undo(
@@ -336,32 +237,6 @@ def test_design_scene_and_report_are_shared(newcomer: Newcomer, tmp_path: Path) 
     newcomer.upload(shared)
     expect(newcomer.notices("shared.json")).to_contain_text("The design paper-optimal.")
     expect(newcomer.figure("Volume")).to_contain_text(volume_of(CHANGED))
-
-
-def test_theme_palette_and_keys_are_found_in_the_bar(newcomer: Newcomer) -> None:
-    dialog = newcomer.page.get_by_role("dialog")
-    light = newcomer.lightness()
-    newcomer.press("Theme")
-    newcomer.wait_for_lightness(lambda now: now < 0.5 * light)
-    newcomer.press("Theme")
-    newcomer.wait_for_lightness(lambda now: now > 0.9 * light)
-    assert newcomer.presses_for() == 2
-    newcomer.type("x", "120")
-    newcomer.press(re.compile("^Search"))
-    expect(newcomer.page.get_by_placeholder("Search commands")).to_be_focused()
-    newcomer.page.keyboard.type("home pose")
-    newcomer.press(re.compile("^Pose › Home pose"))
-    expect(dialog).to_have_count(0)
-    expect(newcomer.field("x")).to_have_value("100")
-    newcomer.press("Help")
-    card = newcomer.page.get_by_role("dialog", name="Help")
-    expect(card).to_contain_text("Search commands and manual")
-    newcomer.key("Escape")
-    expect(dialog).to_have_count(0)
-    newcomer.key("k")
-    card.wait_for()
-    newcomer.press_at(20.0, 600.0)
-    expect(dialog).to_have_count(0)
 
 
 def test_term_is_found_by_the_search_and_page_by_the_question_mark(newcomer: Newcomer) -> None:

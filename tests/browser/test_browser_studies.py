@@ -104,6 +104,8 @@ def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
     open_studies(tab)
     tab.choose("Study", "some")
     plotted = wait_for_plots(tab)
+    table = tab.export("Study", "CSV").path().read_text().splitlines()
+    assert [line.split(",")[0] for line in table[1:]] == [*map(str, range(COUNT))]
 
     # What the pointer is on is read, and a click opens that very design.
     row = loneliest_row(results)

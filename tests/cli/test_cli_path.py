@@ -124,8 +124,8 @@ def test_path_with_load_holds_it_and_tells_the_largest_share(cli: CommandLine) -
             for each in answer["poses"]
         ]
         largest = path_loads(PRESS, poses, load)
-        assert (largest.share <= 1.0 + 1e-4) == holds
-    assert found["largest_share"] == pytest.approx(largest.share, abs=1e-6)
+        assert (largest.utilisation <= 1.0 + 1e-4) == holds
+    assert found["largest_share"] == pytest.approx(largest.utilisation, abs=1e-6)
     assert found["largest_share_bound"] == pytest.approx(largest.bound, rel=0.02)
     assert largest.part is not None
     assert found["largest_share_part"] == LIMITED[largest.part]

@@ -15,7 +15,7 @@ from explorer.app.features.compare.work import ComparedRequest, draw_compared
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.state import StudyPlan, label_of, study_around, title_of
 from explorer.app.features.studies.words import chips
-from explorer.app.state.compared import without_name
+from explorer.app.state.geometry import without_name
 from explorer.cli.commands.optimise import measure_rows as measure_rows_of_command
 from explorer.export.report.data import ReportData
 from explorer.measures.catalogue import CATALOGUE, Measure, measure_design, measures_in

@@ -29,7 +29,7 @@ from explorer.motion.masses import DENSITY, bar_masses, moving_bodies, with_payl
 from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import triple
 from explorer.paths.crossings import path_margins
-from explorer.paths.drives import Drives, TimedPath, check_limits, drives_along
+from explorer.paths.drives import PathDrives, TimedPath, check_limits, drives_along
 from explorer.paths.time_law import TimeLaw, law_at_speed
 
 EMPTY = PRESETS["paper-optimal"]
@@ -53,8 +53,8 @@ def bodies_of(design: Design) -> MovingBodies:
     return moving_bodies(design, bar_masses(design, DENSITY))
 
 
-def drives_of(design: Design, law: TimeLaw) -> Drives:
-    return Drives.along(design, law, bodies_of(design))
+def drives_of(design: Design, law: TimeLaw) -> PathDrives:
+    return PathDrives.along(design, law, bodies_of(design))
 
 
 def law_of_duration(path: list[Pose], duration: float, tool: Triple | None = None) -> TimeLaw:
@@ -118,7 +118,7 @@ def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
     duration, mass = 0.5, 2.0
     bodies = MovingBodies().with_mass(mass, (0.0, 0.0, 0.0))
     law = law_of_duration(ALONG_GUIDE, duration)
-    found = Drives.along(OPTIMAL, law, bodies)
+    found = PathDrives.along(OPTIMAL, law, bodies)
     way = OPTIMAL.unit_mm * WAY
     assert_allclose(found.summary.peak_speed[[1, 3]], 2.0 * way / duration, rtol=1e-9)
     assert_allclose(np.abs(found.acceleration[:, [1, 3]]), 4.0 * way / duration**2, rtol=1e-9)

@@ -135,15 +135,15 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     along = path_loads(design, move, load, tool=(x, y, z), weights=weights)
     shares = dense_shares(design, move, load, weights, tool)
     most = float(shares.max())
-    assert along.share == pytest.approx(most, rel=1e-3)
-    assert most <= along.bound <= (1.0 + TOLERANCE) * along.share
+    assert along.utilisation == pytest.approx(most, rel=1e-3)
+    assert most <= along.bound <= (1.0 + TOLERANCE) * along.utilisation
     assert along.part is not None
     # The part and the place are those of the share that is told.
     there = tool_move(*move, along.place, tool)
     given = Configuration(design, *there, design.tool.position), load
     bodies = weights or MovingBodies().with_payload(design)
     here = limit_shares(design, reactions(*given, bodies))[0]
-    assert here[along.part] == here.max() == pytest.approx(along.share, rel=1e-10)
+    assert here[along.part] == here.max() == pytest.approx(along.utilisation, rel=1e-10)
 
 
 def test_path_loads_of_singular_path_is_infinite_at_its_first_crossing() -> None:
@@ -154,14 +154,14 @@ def test_path_loads_of_singular_path_is_infinite_at_its_first_crossing() -> None
     along = path_loads(design, (home, below, home), [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     crossings = path_margins((home, below, home)).crossings
     assert len(crossings) >= 2
-    assert along.share == along.bound == math.inf
+    assert along.utilisation == along.bound == math.inf
     assert along.part is None
     assert along.place == min(each.move + each.share for each in crossings)
     # A path that lies in the base plane is singular from its start.
     flat = tuple(Pose((x + each, y, 0.0), home.quaternion) for each in (0.0, 1.0))
     along = path_loads(design, flat, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert (along.share, along.place) == (math.inf, 0.0)
-    assert np.isinf(along.shares).all()
+    assert (along.utilisation, along.place) == (math.inf, 0.0)
+    assert np.isinf(along.utilisations).all()
     assert along.bound == math.inf
 
 
@@ -169,10 +169,10 @@ def test_path_loads_without_limit_or_load_has_no_part() -> None:
     x, y, z = OPTIMAL.home_pose.position
     poses = OPTIMAL.home_pose, Pose((x + 1.0, y, z), OPTIMAL.home_pose.quaternion)
     along = path_loads(OPTIMAL, poses, [100.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert (along.share, along.bound, along.part) == (0.0, 0.0, None)
+    assert (along.utilisation, along.bound, along.part) == (0.0, 0.0, None)
     empty = msgspec.structs.replace(random_machine(OPTIMAL, 2), payload=OPTIMAL.payload)
     along = path_loads(empty, poses, np.zeros(6))
-    assert (along.share, along.part) == (0.0, None)
+    assert (along.utilisation, along.part) == (0.0, None)
 
 
 @pytest.mark.parametrize("load", [[1.0, 2.0], [math.nan] * 6, [math.inf] * 6])
@@ -197,13 +197,13 @@ def test_holds_along_is_true_below_the_bound_and_false_above_the_largest_share(s
     load = rng.normal(size=6) * 10.0
     is_held = DemandedLoad.of(design, load).holds_along(moves)
     largest = [path_loads(design, move, load) for move in poses]
-    assert not is_held[[np.isinf(each.share) for each in largest]].any()
-    assert not is_held[[each.share > 1.0 + 1e-4 for each in largest]].any()
+    assert not is_held[[np.isinf(each.utilisation) for each in largest]].any()
+    assert not is_held[[each.utilisation > 1.0 + 1e-4 for each in largest]].any()
     assert is_held[[each.bound <= 1.0 for each in largest]].all()
     # Limits at which a move just holds the load, or just does not.
-    index = next(k for k, each in enumerate(largest) if math.isfinite(each.share))
+    index = next(k for k, each in enumerate(largest) if math.isfinite(each.utilisation))
     for factor in (1.0 + 1e-3, 1.0 - 1e-3):
-        scaled = random_machine(OPTIMAL, seed, strength=factor * largest[index].share)
+        scaled = random_machine(OPTIMAL, seed, strength=factor * largest[index].utilisation)
         at_limit = DemandedLoad.of(scaled, load).holds_along(StraightMoves.along(poses[index]))
         assert at_limit == [factor > 1.0]
 
@@ -226,7 +226,7 @@ def detours() -> tuple[Case, ...]:
         positions = rng.uniform([0, -12, 0], [20, 22, 18], (6000, 3))
         rotations = Rotation.random(6000, random_state=rng).as_matrix()
         valid = poses_are_valid(design, positions, rotations)
-        held = demanded.shares(positions, rotations).max(axis=1) <= 1.0
+        held = demanded.utilisations(positions, rotations).max(axis=1) <= 1.0
         p, r = positions[valid & held][:20], rotations[valid & held][:20]
         first, last = np.triu_indices(len(p), 1)
         moves = p[first], r[first], p[last], r[last]
@@ -234,7 +234,7 @@ def detours() -> tuple[Case, ...]:
         middle = StraightMoves.between(*moves).poses(
             np.arange(len(first)), np.full(len(first), 0.5)
         )
-        is_detour &= demanded.shares(*middle).max(axis=1) > 1.05
+        is_detour &= demanded.utilisations(*middle).max(axis=1) > 1.05
         for a, b in list(zip(first[is_detour], last[is_detour], strict=True))[:1]:
             found.append((design, load, weights, Pose.of(p[a], r[a]), Pose.of(p[b], r[b])))
     return tuple(found[:6])
@@ -268,8 +268,8 @@ def test_plan_path_with_load_holds_it_all_along_by_a_detour(index: int) -> None:
     for poses in (path.poses, path.unsmoothed):
         assert densest(case, poses, tool) <= 1.0 + 1e-4
         along = path_loads(design, poses, load, weights=weights, tool=tool)
-        assert along.share <= 1.0 + 1e-4
-        assert along.bound <= (1.0 + TOLERANCE) * along.share
+        assert along.utilisation <= 1.0 + 1e-4
+        assert along.bound <= (1.0 + TOLERANCE) * along.utilisation
         assert path_margins(poses, tool=np.array(tool)).crossings == ()
 
 
@@ -306,7 +306,9 @@ def test_plan_path_with_load_that_bars_the_way_finds_none() -> None:
 
 def test_plan_path_end_that_does_not_hold_the_load_names_part_and_share() -> None:
     design, load, start, goal = barred()
-    share = float(DemandedLoad.of(design, 2.0 * load).shares(goal.position, goal.rotation).max())
+    share = float(
+        DemandedLoad.of(design, 2.0 * load).utilisations(goal.position, goal.rotation).max()
+    )
     assert share > 1.0
     words = f"actuator l4 at {100.0 * share:.4g} % of its limit"
     with pytest.raises(InputError, match=f"the goal does not hold the load: {words}"):
@@ -321,7 +323,7 @@ def test_plan_path_end_that_does_not_hold_the_load_names_part_and_share() -> Non
 
 def test_plan_path_end_on_the_limit_is_held() -> None:
     design, load, _, goal = barred()
-    share = float(DemandedLoad.of(design, load).shares(goal.position, goal.rotation).max())
+    share = float(DemandedLoad.of(design, load).utilisations(goal.position, goal.rotation).max())
     x, y, z = goal.position
     higher = Pose((x, y, z + 0.1), goal.quaternion)
     path = plan_path(design, goal, higher, load=load / share)

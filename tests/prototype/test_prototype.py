@@ -27,8 +27,8 @@ from explorer.motion.chains import BODIES, LEGS, ON_GUIDE, Places, joints_of_leg
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, bill_of_materials, make_prototype
 from explorer.prototype.fitting import THICKEST_SHARE, broken_joint_limits, buildability
-from explorer.prototype.shapes import Part
-from explorer.prototype.sizes import CLEARANCE, THINNEST_LEG, LegSizes, Stroke
+from explorer.prototype.shapes import PrototypePart
+from explorer.prototype.sizes import CLEARANCE, THINNEST_LEG, LegSizes, StrokeRange
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 HALF_TURN_X, HALF_TURN_Z = np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, -1.0, 1.0])
@@ -72,7 +72,7 @@ PROTOTYPES = {design.name: make_prototype(design) for design in (*DESIGNS, UNBOX
 NAMES = [design.name for design in DESIGNS]
 
 
-def parts_named(prototype: Prototype, *names: str) -> list[Part]:
+def parts_named(prototype: Prototype, *names: str) -> list[PrototypePart]:
     return [part for part in prototype.parts if part.name in names]
 
 
@@ -294,7 +294,7 @@ def test_strokes_of_random_legs_hold_home_and_fit_one_rod(
 ) -> None:
     own = LegSizes(radius, floor * radius)
     at_home = home * own.dead
-    required = Stroke(ends[0] * at_home, ends[1] * at_home)
+    required = StrokeRange(ends[0] * at_home, ends[1] * at_home)
     found = own.stroke(required, at_home)
     slack = 1e-9 * at_home
     assert required.shortest - slack <= found.shortest <= at_home + slack

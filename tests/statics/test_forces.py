@@ -246,7 +246,7 @@ def test_forces_of_singular_pose_are_infinite(
     for most in (np.ones(6), np.full(6, np.inf)):
         worst = worst_direction(Configuration(*given), most)
         assert np.isnan(worst.direction).all()
-        assert (worst.share == np.inf).all()
+        assert (worst.utilisation == np.inf).all()
     held = reactions(Configuration(*given), load)
     for values in (*held[:-1], limit_shares(LIMITED, held)):
         assert (values == np.inf).all()

@@ -58,12 +58,12 @@ def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) ->
             Configuration.at(design, pose, design.tool.position), loads, loaded.weights
         )
         sampled = float(limit_shares(design, held).max())
-        assert sampled <= worst.share * (1.0 + 1e-12)
-        assert sampled >= worst.share * 0.997
+        assert sampled <= worst.utilisation * (1.0 + 1e-12)
+        assert sampled >= worst.utilisation * 0.997
         # The direction reaches it, and the part is the one that does.
         load = np.array(loaded.load) + [*(12.0 * worst.direction), 0.0, 0.0, 0.0]
         there = LoadedPose(design, pose, six(load), OWN)
-        assert there.share == pytest.approx(worst.share, rel=1e-12)
+        assert there.share == pytest.approx(worst.utilisation, rel=1e-12)
         assert there.worst == worst.part
 
 
@@ -86,7 +86,7 @@ def test_loaded_pose_without_limits_holds_any_load_and_a_singular_one_holds_none
     loaded = LoadedPose(design, pose, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     worst = loaded.worst_force(10.0)
     assert loaded.is_regular == (height > 0.0)
-    assert loaded.share == loaded.unit_force.share == worst.share == share
+    assert loaded.share == loaded.unit_force.utilisation == worst.utilisation == share
     assert loaded.largest_payload == payload
     assert np.isnan(worst.direction).all()
 
@@ -185,8 +185,8 @@ def test_forces_and_precision_of_extreme_designs_and_poses_are_numbers(seed: int
         *(
             loaded.share,
             loaded.largest_payload,
-            loaded.unit_force.share,
-            loaded.worst_force(1.0).share,
+            loaded.unit_force.utilisation,
+            loaded.worst_force(1.0).utilisation,
         ),
         *(precision.largest_displacement, *precision.worst()[:2], *precision.rms()),
         *np.ravel(precision.deflection).tolist(),

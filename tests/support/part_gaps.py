@@ -9,10 +9,10 @@ from manifold3d import Error, Manifold, Mesh64
 
 from explorer.motion.chains import Places
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.shapes import Part
+from explorer.prototype.shapes import PrototypePart
 
 
-def overlaps(parts: Sequence[Part], places: Places) -> Iterator[tuple[str, str, float]]:
+def overlaps(parts: Sequence[PrototypePart], places: Places) -> Iterator[tuple[str, str, float]]:
     """Yield the pairs of parts that share a volume, and the volume in cubed design units.
 
     Args:
@@ -30,7 +30,9 @@ def overlaps(parts: Sequence[Part], places: Places) -> Iterator[tuple[str, str, 
                     yield parts[i].name, parts[j].name, volume
 
 
-def least_gap(parts: Sequence[Part], places: Places, within: float) -> tuple[float, str, str]:
+def least_gap(
+    parts: Sequence[PrototypePart], places: Places, within: float
+) -> tuple[float, str, str]:
     """Return the least distance of two parts in design units, and their names.
 
     Args:
@@ -51,7 +53,7 @@ def least_gap(parts: Sequence[Part], places: Places, within: float) -> tuple[flo
 
 
 def placed(
-    parts: Sequence[Part], places: Places
+    parts: Sequence[PrototypePart], places: Places
 ) -> tuple[list[Manifold], list[tuple[FloatArray, FloatArray]]]:
     """Return the parts in one pose, and the corners of their bounding boxes."""
     known: list[Manifold] = []

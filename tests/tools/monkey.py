@@ -33,6 +33,7 @@ from server_clock import wait_until_drawn
 from socket_tab import SocketTab
 
 from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
+from explorer.app.features.paths.state import Paths, journey_of
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
 from explorer.app.session.session import UNDONE
@@ -216,9 +217,9 @@ class Monkey:
         deadline = time.monotonic() + PATIENCE_SECONDS
         while time.monotonic() < deadline:
             assert wait_until_drawn(page, PATIENCE_SECONDS), "the page does not come to rest"
-            journey = page.session.state.journey
+            journey = journey_of(page.session.state)
             is_on = journey is not None and journey.is_playing
-            if not is_on and not page.session.state.paths.is_planning:
+            if not is_on and not Paths.of(page.session.state).is_planning:
                 time.sleep(0.1)
                 if page.session.wait_until_idle(0.0):
                     return

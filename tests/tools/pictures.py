@@ -26,6 +26,7 @@ from playwright.sync_api import Browser, FloatRect, Page
 from server_clock import wait_until_drawn
 
 from explorer.app.features.compare.feature import Pin
+from explorer.app.features.compare.state import Look
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest
 from explorer.app.features.sharing.reporting import make_report
@@ -45,7 +46,6 @@ from explorer.app.state.actions import (
     SetPosition,
     SetVariable,
 )
-from explorer.app.state.compared import Look
 from explorer.app.state.view import (
     ForcesView,
     OrientationView,

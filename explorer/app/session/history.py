@@ -12,9 +12,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from explorer.app.state.actions import Action, Open, Reset, SetMode
+from explorer.app.state.actions import Action
 from explorer.app.state.state import Gesture, State
-from explorer.app.state.view import View
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.page.state.presses import Press
@@ -66,8 +65,7 @@ class UserAction:
         return replace(after, gesture=self._gesture(state, after))
 
     def _gesture(self, before: State, after: State) -> Gesture | None:
-        is_jump = isinstance(self.action, Open | Reset | SetMode)
-        if is_jump or after.design.variables != before.design.variables:
+        if self.action.is_jump or after.design.variables != before.design.variables:
             # The legs did not move from one pose to the other.
             return None
         gesture = before.gesture
@@ -124,13 +122,13 @@ class History:
     def record(self, event: UserAction, state: State) -> History:
         """Return the history after an action that led to a state.
 
-        A search for a better design is one step, made when it ends.
+        Long work on the design, such as a search, is one step, made when it ends.
         """
-        present, after = self.step, state_of_step(state)
-        if state.optimisation.is_on or after == present.state:
+        present, after = self.step, state.for_step()
+        if state.busy or after == present.state:
             return self
         earlier = self.steps[: self.at]
-        shown = replace(after, view=_with_point_of(present.state.view, after.view))
+        shown = after.with_view_of(present.state)
         words = event.action.describe(after)
         repeats = self.is_open and event.action.repeats and words == present.words
         if event.action.continues or shown == present.state or repeats:
@@ -146,6 +144,14 @@ class History:
         step = Step(number, words, after, source, event.time, event.press, event.who)
         steps = (*earlier, present, step)[-MOST_STEPS:]
         return History(steps, len(steps) - 1, is_open=True)
+
+    def restore(self, present: State) -> History:
+        """Return the history with the state of its step restored in place of the present one.
+
+        Raises:
+            InputError: The design cannot be changed now.
+        """
+        return self.with_state(self.step.state.restore_over(present))
 
     def with_state(self, state: State) -> History:
         """Return the history with another state in the step that the page shows."""
@@ -179,48 +185,7 @@ class History:
 
 def start_history(state: State) -> History:
     """Return the history of a design that has just been opened."""
-    return History((Step(0, f"Open {state.design.name}", state_of_step(state)),))
-
-
-def state_of_step(state: State) -> State:
-    """Return the state of a step: without gesture, planning and playing."""
-    paths = state.paths
-    journey = paths.journey
-    if journey is not None and journey.is_playing:
-        journey = replace(journey, is_playing=False)
-    if paths.is_planning or journey is not paths.journey:
-        paths = replace(paths, planning=None, journey=journey)
-    return replace(state, gesture=None, paths=paths)
-
-
-def restore(history: History, present: State) -> tuple[State, History]:
-    """Return the state of the step of a history, and the history with this state in its step.
-
-    The view, but for its point, and the counts of requests are those of the present state.
-
-    Raises:
-        InputError: A design is being optimised.
-    """
-    if present.optimisation.is_on:
-        raise InputError(
-            "the design is being optimised: cancel that first, then undo what led to it"
-        )
-    step = history.step.state
-    view = present.in_unit_of(step.design).view
-    state = replace(step, view=_with_point_of(view, step.view))
-    # No number of a request is used twice.
-    request = max(state.paths.request, present.paths.request)
-    restored = replace(
-        state,
-        paths=replace(state.paths, request=request),
-        optimisation=state.optimisation.continue_numbers(present.optimisation),
-    )
-    return restored, history.with_state(restored)
-
-
-def _with_point_of(view: View, other: View) -> View:
-    """Return a view with the point whose position is shown and set in another one."""
-    return view if view.at == other.at else replace(view, at=other.at)
+    return History((Step(0, f"Open {state.design.name}", state.for_step()),))
 
 
 def check_drawable(state: State) -> None:

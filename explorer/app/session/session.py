@@ -12,58 +12,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from explorer.app.session.history import History, UserAction, restore, start_history
+from explorer.app.session.history import History, UserAction, start_history
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.errors import DesignError, ExplorerError
-from explorer.mechanism.machine import Tolerances
+from explorer.errors import ExplorerError
 from explorer.page.session.clock import moment_of
 from explorer.page.session.latest import LatestWins
 from explorer.page.state.presses import Press
-from explorer.workspace.limits.table import LIMITS
 
 # Seconds after which a thread that waits for changes looks whether the session has ended.
 WAKE_SECONDS = 1.0
 # Key of requests to draw the present state again.
 REDRAW = "redraw"
 UNDONE = "Another browser has undone {}. Redo or History brings it back."
-
-# Names of the fields of a design file in the words of the page.
-FIELD_WORDS = {
-    "name": "The name",
-    "unit_mm": "The unit",
-    "node_step": "The step of the nodes",
-    "required_box": "The required box",
-    "limits.leg_radii": "The radius of a leg",
-    "tool.position": "The tool point",
-    "payload.mass_kg": "The mass of the payload",
-    "payload.centre": "The centre of the payload",
-    "payload.inertia_kg_mm2": "The inertia of the payload",
-    "payload.force_n": "The force on the tool",
-    "gravity": "The direction of gravity",
-    "actuators.push_n": "The push of an actuator",
-    "actuators.pull_n": "The pull of an actuator",
-    "actuators.continuous_n": "The continuous force of an actuator",
-    "actuators.speed_mm_s": "The speed of an actuator",
-    "actuators.acceleration_mm_s2": "The acceleration of an actuator",
-    "actuators.error_mm": "The error of an actuator",
-    "actuators.stiffness_n_mm": "The stiffness of an actuator",
-    **{f"tolerances.{name}": "A tolerance" for name in Tolerances.__struct_fields__},
-    "struts.outer_mm": "The outer diameter of the struts",
-    "struts.inner_mm": "The inner diameter of the struts",
-    "struts.modulus_gpa": "Young's modulus of the struts",
-    "struts.stress_mpa": "The largest stress of the struts",
-    "struts.moment_nm": "The largest moment of the struts",
-    "guide.force_n": "The largest force on the guide",
-    "guide.moment_nm": "The largest moment on the guide",
-    **{
-        f"limits.{limit.path}{part}": words
-        for limit in LIMITS
-        for part, words in limit.subjects.items()
-    },
-}
-"""Name of each field at the beginning of a sentence."""
 
 Change = Callable[[State], Action | None]
 """Function from the present state to an action; None for none."""
@@ -106,6 +68,7 @@ class Session:
         press_at: Returns the press of a client at a time, if there was one; None if no client
             reports presses.
         tell: Called with a message and the client whose step another one has undone.
+        words_of: Returns the message for people about an error.
     """
 
     def __init__(
@@ -118,6 +81,7 @@ class Session:
         *,
         press_at: Callable[[Who, float], Press | None] | None = None,
         tell: Callable[[str, Who], None] = lambda _, __: None,
+        words_of: Callable[[ExplorerError], str] = str,
     ) -> None:
         self._state = state
         self._history = start_history(state) if history is None else history
@@ -126,6 +90,7 @@ class Session:
         self._report = report
         self._press_at = press_at
         self._tell = tell
+        self._words_of = words_of
         self._jobs: LatestWins[_Posted] = LatestWins(self._handle, "session")
 
     @property
@@ -199,7 +164,7 @@ class Session:
                 try:
                     self._apply(item)
                 except ExplorerError as error:
-                    self._complain(message_of(error), item.who)
+                    self._complain(self._words_of(error), item.who)
             # A refusal is drawn too: the control that was moved must go back.
             self._draw(Frame(self._state))
         except Exception as error:  # noqa: BLE001 - one bad frame must not end the session
@@ -207,9 +172,9 @@ class Session:
 
     def _apply(self, item: _Posted) -> None:
         if isinstance(item.change, HistoryMove):
-            history = item.change.move(self._history)
+            history = item.change.move(self._history).restore(self._state)
             undone = self._history.steps[history.at + 1 : self._history.at + 1]
-            self._replace(*restore(history, self._state))
+            self._replace(history.step.state, history)
             # The first step of each other client.
             for who, words in {each.who: each.words for each in undone[::-1]}.items():
                 if item.who is not None and who not in (None, item.who):
@@ -227,10 +192,3 @@ class Session:
         # The history first: a thread that sees the new state finds its step.
         self._history = history
         self._state = state
-
-
-def message_of(error: ExplorerError) -> str:
-    """Return the message of an error in the words of the page."""
-    if isinstance(error, DesignError) and error.field in FIELD_WORDS:
-        return error.message_about(FIELD_WORDS[error.field])
-    return str(error)

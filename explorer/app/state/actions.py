@@ -40,11 +40,13 @@ class Action(ABC):
             `design`, the name of the design after it; "" for the name of the class.
         continues: Whether the action belongs to the step before it.
         repeats: Whether it belongs to the step before it if both have the same words.
+        is_jump: Whether the platform did not move from the pose before to that after it.
     """
 
     template: ClassVar[str] = ""
     continues: ClassVar[bool] = False
     repeats: ClassVar[bool] = False
+    is_jump: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, state: State) -> State:
@@ -86,6 +88,7 @@ class Open(Action):
     """Open a design in its home pose; parts of the state stay as they declare."""
 
     template: ClassVar[str] = "Open {design}"
+    is_jump: ClassVar[bool] = True
 
     design: Design
 
@@ -95,7 +98,7 @@ class Open(Action):
         Raises:
             InputError: The design is being optimised.
         """
-        check_free(state)
+        state.check_free()
         kept = parts_kept_on_open(state.in_unit_of(self.design))
         return replace(open_state(self.design), **kept)
 
@@ -105,6 +108,7 @@ class Reset(Action):
     """Return to the design as it was opened, in its home pose."""
 
     template: ClassVar[str] = "Reset to {design} as it was opened"
+    is_jump: ClassVar[bool] = True
 
     def apply(self, state: State) -> State:
         """Return the next state."""
@@ -239,6 +243,8 @@ class StartThere(Action):
 class SetMode(Action):
     """Jump to another assembly mode of the same joints."""
 
+    is_jump: ClassVar[bool] = True
+
     mode: int
 
     def apply(self, state: State) -> State:
@@ -267,7 +273,7 @@ class SetVariable(Action):
             InputError: The legs are held and cannot close in the new design, or the
                 design is being optimised.
         """
-        check_free(state)
+        state.check_free()
         design = state.design.with_variable(self.name, self.value)
         if state.hold == "pose":
             return move_to(replace(state, design=design), state.pose, state.yaw_pitch_roll)
@@ -301,7 +307,7 @@ class SetName(Action):
             DesignError: The name is blank, or not one printable line.
             InputError: The design is being optimised.
         """
-        check_free(state)
+        state.check_free()
         return replace(state, design=msgspec.structs.replace(state.design, name=self.name))
 
 
@@ -347,7 +353,7 @@ class Set(Action):
         """
         if not self.at.startswith("design"):
             return with_value(state, self.at, self.value)
-        check_free(state)
+        state.check_free()
         design = with_value(state, self.at, self.value).design
         if design.required_box == state.design.required_box:
             box = in_unit(design.required_box, state.unit, state.view.unit_for(design))
@@ -386,16 +392,6 @@ def _assemble(state: State, solution: ForwardKinematics, mode: int) -> State:
     """Return the state in one of the eight poses that its joints have."""
     pose = Pose.of(solution.position[mode], solution.rotation[mode])
     return replace(state, pose=pose, yaw_pitch_roll=angles_of(pose), mode=mode, unclosed=None)
-
-
-def check_free(state: State) -> None:
-    """Check that the design may be changed.
-
-    Raises:
-        InputError: The design is being optimised.
-    """
-    if state.optimisation.is_on:
-        raise InputError("the design is being optimised: wait until that is done, or cancel it")
 
 
 def _unclosed_error(design: Design, joints: states.Joints, cause: SetJoint) -> states.Unclosed:

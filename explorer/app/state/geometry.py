@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from explorer.app.state.actions import Action, Open, Set, check_free
+from explorer.app.state.actions import Action, Open, Set
 from explorer.app.state.parts import in_unit
 from explorer.app.state.state import State
 from explorer.app.state.view import View
@@ -51,6 +51,11 @@ def without_machine(design: Design) -> Design:
     return with_machine(design, ideal, View())
 
 
+def without_name(design: Design) -> Design:
+    """Return a design without its name, on which nothing else depends."""
+    return msgspec.structs.replace(design, name="untitled")
+
+
 def preset_of(design: Design) -> str | None:
     """Return the name of the preset whose geometry and name a design has; None if it has none."""
     preset = PRESETS.get(design.name)
@@ -77,5 +82,5 @@ class ClearMachine(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; refuse while the design is being optimised."""
-        check_free(state)
+        state.check_free()
         return replace(state, design=without_machine(state.design))

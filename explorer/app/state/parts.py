@@ -1,6 +1,7 @@
 """Parts of the state: values by path, and what a file and another design leave of each.
 
-A path is such as "view.singular.ball" or "view.tetrahedra.0". Each field of the state, and of its
+A path is such as "view.singular.ball", "view.tetrahedra.0" or, for a value of a feature's part,
+"studies.plan.count". Each field of the state, and of its
 parts, declares as its metadata what becomes of it when the state is saved, when another design is
 opened, and when the design unit changes. A field that declares nothing is saved, is that of a new
 state once another design is opened, and keeps its numbers in another unit.
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import Field, fields, is_dataclass, replace
-from typing import Any, Self, TypeVar, cast
+from typing import Any, ClassVar, Self, TypeVar, cast
 
 import msgspec
 
@@ -43,31 +44,61 @@ VOLUME: Mapping[str, Any] = {"power": 3}
 
 
 class FeaturePart:
-    """A part of the state whose class stands in the folder of a feature.
+    """A feature's part of the state, a frozen dataclass in the folder of the feature.
 
-    The state knows a base that inherits from this class, with what others need of the part. The
-    feature's own class, a frozen dataclass, inherits from that base.
+    Its class names it, as in `class Studies(FeaturePart, name="studies")`. Every new state has a
+    new one of each. What the state asks of a part, a part answers by what it overrides.
+
+    Attributes:
+        in_state: The name.
     """
 
-    def __init_subclass__(cls) -> None:
-        """Register the class of a feature."""
-        (base,) = cls.__bases__
-        if base is not FeaturePart:
-            FEATURE_PARTS[base] = cls
+    in_state: ClassVar[str]
+
+    def __init_subclass__(cls, name: str) -> None:
+        """Add the class to `FEATURE_PARTS`."""
+        FEATURE_PARTS[name] = cls
+        cls.in_state = name
 
     @classmethod
-    def new(cls) -> Self:
-        """Return the part of a new state; the base itself where the feature is not loaded."""
-        return cast("Self", FEATURE_PARTS.get(cls, cls)())
-
-    @classmethod
-    def of(cls, state: object) -> Self:
+    def of(cls, state: Any) -> Self:
         """Return this part of a state."""
-        return next(part for part in vars(state).values() if isinstance(part, cls))
+        return state.parts[cls.in_state]
+
+    @property
+    def busy(self) -> str:
+        """Why the design cannot be changed now, as a clause; "" if it can."""
+        return ""
+
+    def on_open(self) -> Self:
+        """Return what stays when another design is opened."""
+        return self
+
+    def for_step(self) -> Self:
+        """Return what a step of the history keeps: nothing that goes on."""
+        return self
+
+    def continue_from(self, present: Any) -> Self:
+        """Return this part, of an earlier step, when it is restored in place of a present one."""
+        del present
+        return self
 
 
-FEATURE_PARTS: dict[type[FeaturePart], type[FeaturePart]] = {}
-"""The classes of the features by the bases that the state knows."""
+FEATURE_PARTS: dict[str, type[FeaturePart]] = {}
+"""The classes of the parts by their names."""
+
+Parts = Mapping[str, FeaturePart]
+"""The parts of a state by their names."""
+
+
+def new_parts() -> Parts:
+    """Return the parts of a new state."""
+    return {name: kind() for name, kind in FEATURE_PARTS.items()}
+
+
+def keep_on_open(parts: Parts) -> Parts:
+    """Return what stays of the parts when another design is opened."""
+    return {name: part.on_open() for name, part in parts.items()}
 
 
 def saved_fields(kind: Any) -> tuple[Field[Any], ...]:
@@ -105,27 +136,32 @@ def in_unit(part: Whole, before: Unit, after: Unit, power: int = 1) -> Whole:
             for field in fields(value)
             if "power" in field.metadata
         }
-        return cast("Whole", replace(cast("Any", value), **changes))
-    if isinstance(value, Pose):
-        position = in_unit(value.position, before, after)
-        return cast("Whole", Pose(position, value.quaternion))
-    if isinstance(value, tuple):
+        value = replace(cast("Any", value), **changes)
+    elif isinstance(value, Pose):
+        value = Pose(in_unit(value.position, before, after), value.quaternion)
+    elif isinstance(value, Mapping):
+        parts = cast("Mapping[str, object]", value)
+        value = {name: in_unit(part, before, after) for name, part in parts.items()}
+    elif isinstance(value, tuple):
         entries = cast("tuple[object, ...]", value)
-        return cast("Whole", tuple(in_unit(entry, before, after, power) for entry in entries))
-    if isinstance(value, float):
-        return cast("Whole", after.to_power(power).read(before.to_power(power).convert(value)))
-    return part
+        value = tuple(in_unit(entry, before, after, power) for entry in entries)
+    elif isinstance(value, float):
+        value = after.to_power(power).read(before.to_power(power).convert(value))
+    return cast("Whole", value)
 
 
 def value_at(whole: object, path: str) -> Any:
-    """Return the value at a path: names of fields and indices of tuples, joined by dots.
+    """Return the value at a path: names of fields or parts and indices, joined by dots.
 
     Raises:
         AttributeError: The path names a field that is not there.
     """
     value: Any = whole
     for name in path.split("."):
-        value = value[int(name)] if name.isdecimal() else getattr(value, name)
+        if name in getattr(value, "parts", ()):
+            value = value.parts[name]
+        else:
+            value = value[int(name)] if name.isdecimal() else getattr(value, name)
     return value
 
 
@@ -144,6 +180,8 @@ def with_value(whole: Whole, path: str, value: object) -> Whole:
         return cast("Whole", (*values[:index], new, *values[index + 1 :]))
     if isinstance(part, msgspec.Struct):
         return cast("Whole", msgspec.structs.replace(part, **{name: new}))
+    if name in getattr(part, "parts", ()):
+        return replace(part, parts={**part.parts, name: new})
     return replace(part, **{name: new})
 
 
@@ -173,4 +211,5 @@ def _names_of(value: Any) -> tuple[str, ...]:
         return tuple(map(str, range(len(cast("tuple[object, ...]", value)))))
     if isinstance(value, msgspec.Struct):
         return value.__struct_fields__
-    return tuple(field.name for field in fields(value)) if is_dataclass(value) else ()
+    names = tuple(field.name for field in fields(value)) if is_dataclass(value) else ()
+    return (*getattr(value, "parts", ()), *(name for name in names if name != "parts"))

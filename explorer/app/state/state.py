@@ -7,17 +7,23 @@ There is one state for the whole server, shared by every tab. It changes only th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from operator import methodcaller
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.app.state.compared import Compared
-from explorer.app.state.parts import LENGTHS, STAYS, TRANSIENT, FeaturePart, in_unit
-from explorer.app.state.paths import Journey, Mode, Paths
+from explorer.app.state.parts import (
+    LENGTHS,
+    STAYS,
+    TRANSIENT,
+    Parts,
+    in_unit,
+    keep_on_open,
+    new_parts,
+)
 from explorer.app.state.view import View
+from explorer.errors import InputError
 from explorer.mechanism import pose as poses, tilt_torsion as tilts
 from explorer.mechanism.configuration import Point, offset_of, point_of, position_of
 from explorer.mechanism.design import JOINTS, Design
@@ -31,6 +37,8 @@ from explorer.numerics.number_text import Unit
 from explorer.page.state.presses import Press
 from explorer.singularity.colours import WARN_SHARE
 
+Mode = Annotated[int, msgspec.Meta(ge=0, le=7)]
+"""Index of an assembly mode."""
 Joints = tuple[float, float, float, float, float, float]
 Folds = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
@@ -95,33 +103,6 @@ class Gesture:
     press: Press | None = None
 
 
-class OptimisationPart(FeaturePart):
-    """The optimiser's part of the state as others see it: without a run unless it says so."""
-
-    @property
-    def is_on(self) -> bool:
-        """Whether a run has not ended yet."""
-        return False
-
-    @property
-    def own(self) -> State | None:
-        """The state before the run; None without a run."""
-        return None
-
-    def without_run(self) -> Self:
-        """Return what stays when another design is opened."""
-        return self
-
-    def continue_numbers(self, other: OptimisationPart) -> Self:
-        """Return this part whose next run has a number above those of another part, too."""
-        del other
-        return self
-
-
-class StudiesPart(FeaturePart):
-    """The part of the state on studies of designs, of which others need nothing."""
-
-
 @dataclass(frozen=True)
 class State:
     """The state, from which everything on the page follows.
@@ -140,10 +121,7 @@ class State:
             close, and why it was taken, a sentence; None if none was.
         gesture: The gesture that led to the pose; None if none did, as after a change of the
             design.
-        paths: The path that is played, and the settings of the next one.
-        optimisation: The request for an optimisation, and its last run.
-        compared: The designs that this one is compared with.
-        studies: The open study of designs, and how it is shown.
+        parts: The parts of the features by their names; `FeaturePart.of` returns one.
         set_tilt_torsion: Azimuth, tilt and torsion in degrees as the user last set them, which
             count while they give the rotation of the pose; None if none were set.
         set_tool_angles: Yaw, pitch and roll of the tool in degrees as the user last set them, which
@@ -162,15 +140,7 @@ class State:
     view: View = field(default_factory=View, metadata={**STAYS, **LENGTHS})
     taken: tuple[Joints, str] | None = field(default=None, compare=False, metadata=TRANSIENT)
     gesture: Gesture | None = field(default=None, metadata=TRANSIENT)
-    paths: Paths = field(
-        default_factory=Paths, metadata={"on_open": methodcaller("without_path"), **LENGTHS}
-    )
-    optimisation: OptimisationPart = field(
-        default_factory=OptimisationPart.new,
-        metadata={"on_open": methodcaller("without_run"), **LENGTHS},
-    )
-    compared: Compared = field(default_factory=Compared, metadata=STAYS)
-    studies: StudiesPart = field(default_factory=StudiesPart.new, metadata=STAYS)
+    parts: Parts = field(default_factory=new_parts, metadata={"on_open": keep_on_open, **LENGTHS})
     set_tilt_torsion: tilts.TiltTorsion | None = None
     set_tool_angles: Triple | None = None
     set_folds: GivenFolds | None = None
@@ -179,12 +149,43 @@ class State:
         """Return the state with its `LENGTHS` in the unit of a design, as the page shows them."""
         return in_unit(self, self.unit, self.view.unit_for(design))
 
-    def for_file(self) -> State:
-        """Return the state as a file holds it: while a run goes on, the state before the run."""
-        optimisation = self.optimisation
-        if optimisation.own is None or not optimisation.is_on:
-            return self
-        return replace(optimisation.own, optimisation=optimisation.without_run())
+    def for_step(self) -> State:
+        """Return what a step of the history keeps: without gesture and what else goes on."""
+        parts = {name: part.for_step() for name, part in self.parts.items()}
+        return replace(self, gesture=None, parts=parts)
+
+    def with_view_of(self, other: State) -> State:
+        """Return the state with the view of another one, but for the point that is shown and set.
+
+        Its lengths stay as the page shows them.
+        """
+        view = in_unit(other.view, other.unit, other.view.unit_for(self.design))
+        return replace(self, view=replace(view, at=self.view.at))
+
+    def restore_over(self, present: State) -> State:
+        """Return the state, of a step, with what stays of the present one: the view and counts.
+
+        Raises:
+            InputError: The design cannot be changed now.
+        """
+        if present.busy:
+            raise InputError(f"{present.busy}: cancel that first, then undo what led to it")
+        parts = {name: part.continue_from(present.parts[name]) for name, part in self.parts.items()}
+        return replace(self.with_view_of(present), parts=parts)
+
+    def check_free(self) -> None:
+        """Check that the design may be changed.
+
+        Raises:
+            InputError: It may not, for instance while it is being optimised.
+        """
+        if self.busy:
+            raise InputError(f"{self.busy}: wait until that is done, or cancel it")
+
+    @property
+    def busy(self) -> str:
+        """Why the design cannot be changed now, as a clause; "" if it can."""
+        return next((part.busy for part in self.parts.values() if part.busy), "")
 
     @property
     def tilt_torsion(self) -> tilts.TiltTorsion:
@@ -261,19 +262,6 @@ class State:
         """Why the present length is not the one that the user set; None where it is."""
         joints, words = self.taken or (None, "")
         return words if joints == self.joints else None
-
-    @property
-    def journey(self) -> Journey | None:
-        """The present path; None where there is none, or one made for another design.
-
-        It stays while a payload and actuators are chosen for it.
-        """
-        journey, new = self.paths.journey, self.design
-        if journey is None or journey.design == new:
-            return journey
-        carrying = {"payload": new.payload, "actuators": new.actuators}
-        is_for_it = msgspec.structs.replace(journey.design, **carrying) == new
-        return replace(journey, design=new) if is_for_it else None
 
     @property
     def warn_below(self) -> float:

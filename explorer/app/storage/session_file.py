@@ -4,9 +4,8 @@ A file belongs to the process that holds the lock beside it; the system releases
 process ends, however it does. The next explorer that starts continues the newest session
 without a process.
 
-The first line of a file holds its schema, the second the steps. Most of a step is what it was in
-the step before. So each object is written once, into a list; wherever else it occurs, a reference
-`{"#": n}` gives its index in the list. An object refers only to those before it. Every number is
+The first line of a file holds its schema, the second the steps. Of each step it has the words and
+the values that differ from those of the step before, by their paths in the state. Every number is
 kept to the last bit.
 """
 
@@ -16,16 +15,15 @@ import contextlib
 import math
 import secrets
 import threading
-from collections.abc import Iterable, Mapping
 from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, cast, get_type_hints
 
 import msgspec
 from filelock import FileLock
 
 from explorer.app.session.history import History, Step
-from explorer.app.state.parts import FEATURE_PARTS, FeaturePart, saved_fields
+from explorer.app.state.parts import FEATURE_PARTS, FeaturePart, saved_fields, value_at
 from explorer.app.state.state import State
 from explorer.errors import InputError, StorageError
 from explorer.files.json_text import one_line
@@ -39,10 +37,11 @@ BROKEN = ".broken"
 # Number of other sessions kept of explorers that have ended, the newest ones.
 MOST_ORPHANS = 10
 # The schema of the files.
-SCHEMA = 3
+SCHEMA = 4
 # Largest number of steps in a file.
 MOST_STEPS = 50
-REFERENCE = "#"
+# Field with the name of a part of the state within another value.
+PART = "part"
 
 Index = Annotated[int, msgspec.Meta(ge=0)]
 
@@ -139,22 +138,25 @@ class DamagedError(StorageError):
     """A file that no explorer can use."""
 
 
+class _Step(msgspec.Struct, forbid_unknown_fields=True):
+    """A step: what was done, and the values of the state that it changed, by path."""
+
+    words: str
+    changes: dict[str, Any]
+
+
 class _Body(msgspec.Struct, forbid_unknown_fields=True):
     """The second line.
 
     Attributes:
-        words: What was done in each step.
         at: Index of the step that the page shows.
         first: Number of the first step.
-        objects: All objects, each referring to those before it.
-        states: Index of the state after each step.
+        steps: The steps, the first one with the whole state.
     """
 
-    words: list[str]
     at: Index
     first: Index
-    objects: list[Any]
-    states: list[Index]
+    steps: list[_Step]
 
 
 def encode_session(history: History) -> bytes:
@@ -166,10 +168,17 @@ def encode_session(history: History) -> bytes:
         StorageError: A number in it is not finite.
     """
     start = max(0, min(len(history.steps) - MOST_STEPS, history.at - MOST_STEPS // 2))
-    steps = history.steps[start : start + MOST_STEPS]
-    objects, states = _pack(step.state for step in steps)
-    words, at = [step.words for step in steps], history.at - start
-    body = _Body(words, at, steps[0].number, objects, states)
+    steps, before = list[_Step](), dict[str, Any]()
+    for step in history.steps[start : start + MOST_STEPS]:
+        values = _values_of(step.state)
+        changes = {
+            path: _saved(value)
+            for path, value in values.items()
+            if path not in before or value is not before[path]
+        }
+        steps.append(_Step(step.words, changes))
+        before = values
+    body = _Body(history.at - start, history.steps[start].number, steps)
     return b'{"schema":%d}\n%b\n' % (SCHEMA, msgspec.json.encode(body))
 
 
@@ -194,71 +203,62 @@ def decode_session(data: bytes, source: str) -> History:
 
 
 def _history_of(body: _Body) -> History:
-    pairs = zip(body.words, _unpack(body.objects, body.states), strict=True)
-    steps = tuple(Step(number, *pair) for number, pair in enumerate(pairs, body.first))
+    steps, values, kinds = list[Step](), dict[str, Any](), _kinds()
+    for number, step in enumerate(body.steps, body.first):
+        for path, raw in step.changes.items():
+            values[path] = msgspec.convert(raw, kinds[path], dec_hook=_part_of)
+        steps.append(Step(number, step.words, _state_of(values)))
     if not body.at < len(steps):
         raise InputError(f"there is no step {body.at}")
-    return History(steps, body.at)
+    return History(tuple(steps), body.at)
 
 
-def _pack(states: Iterable[State]) -> tuple[list[Any], list[int]]:
-    """Return the objects of states as JSON texts, and the index of each state among them."""
-    numbers: dict[bytes, int] = {}
-    # By the id of an object: its reference, and the object itself, which keeps the id.
-    packed: dict[int, tuple[dict[str, int], object]] = {}
-
-    def reference_to(value: object) -> dict[str, int]:
-        if id(value) not in packed:
-            fields = {name: pack(each) for name, each in _fields_of(value).items()}
-            number = numbers.setdefault(msgspec.json.encode(fields), len(numbers))
-            packed[id(value)] = {REFERENCE: number}, value
-        return packed[id(value)][0]
-
-    def pack(value: Any) -> Any:
-        if isinstance(value, float) and not math.isfinite(value):
-            raise StorageError(f"the session holds a value that no file can: {value}")
-        if value is None or isinstance(value, bool | int | float | str):
-            return value
-        if isinstance(value, list | tuple):
-            return [pack(each) for each in cast("list[Any]", value)]
-        return reference_to(value)
-
-    indices = [reference_to(state)[REFERENCE] for state in states]
-    return [msgspec.Raw(text) for text in numbers], indices
+def _kinds() -> dict[str, Any]:
+    """Return the types of the values that a file holds, by their paths in the state."""
+    found = {field.name: get_type_hints(State)[field.name] for field in saved_fields(State)}
+    del found["parts"]
+    for name, kind in FEATURE_PARTS.items():
+        hints = get_type_hints(kind)
+        found |= {f"{name}.{field.name}": hints[field.name] for field in saved_fields(kind)}
+    return found
 
 
-def _fields_of(value: Any) -> Mapping[str, Any]:
-    saved: Any = value.for_file() if hasattr(value, "for_file") else value
-    if is_dataclass(saved):
-        return {field.name: getattr(saved, field.name) for field in saved_fields(saved)}
-    return cast("dict[str, Any]", saved) if isinstance(saved, dict) else msgspec.to_builtins(saved)
+def _values_of(state: State) -> dict[str, Any]:
+    return {path: value_at(state, path) for path in _kinds()}
 
 
-def _unpack(objects: list[dict[str, Any]], numbers: list[int]) -> list[State]:
-    """Return the states with these indices in a list of objects.
+def _state_of(values: dict[str, Any]) -> State:
+    """Return the state with values by their paths.
 
     Raises:
-        Exception: They are no states, or an object refers to one that does not come before.
+        Exception: A value is missing, or a part refuses one.
     """
-    resolved: list[Any] = []
-
-    def value_of(raw: Any) -> Any:
-        if isinstance(raw, list):
-            return [value_of(each) for each in cast("list[Any]", raw)]
-        if not isinstance(raw, dict):
-            return raw
-        (number,) = cast("dict[str, Any]", raw).values()
-        if REFERENCE not in raw or not 0 <= number < len(resolved):
-            raise InputError(f"there is no object {number}")
-        return resolved[number]
-
-    for each in objects:
-        fields = {name: value_of(raw) for name, raw in each.items()}
-        resolved.append(fields)
-    states = {n: msgspec.convert(resolved[n], State, dec_hook=_part_of) for n in {*numbers}}
-    return [states[number] for number in numbers]
+    own = {path: value for path, value in values.items() if "." not in path}
+    parts = {
+        name: kind(**{each.name: values[f"{name}.{each.name}"] for each in saved_fields(kind)})
+        for name, kind in FEATURE_PARTS.items()
+    }
+    return State(**own, parts=parts)
 
 
-def _part_of(base: type[FeaturePart], value: Any) -> Any:
-    """Return the part of a feature, of which the state names the base alone."""
-    return msgspec.convert(value, FEATURE_PARTS[base], dec_hook=_part_of)
+def _saved(value: Any) -> Any:
+    """Return a value as a file holds it, of plain types."""
+    if hasattr(value, "for_file"):
+        value = value.for_file()
+    if isinstance(value, msgspec.Struct):
+        value = msgspec.to_builtins(value)
+    if is_dataclass(value):
+        saved = {each.name: _saved(getattr(value, each.name)) for each in saved_fields(value)}
+        return saved | {PART: value.in_state} if isinstance(value, FeaturePart) else saved
+    if isinstance(value, dict):
+        return {name: _saved(each) for name, each in cast("dict[str, Any]", value).items()}
+    if isinstance(value, list | tuple):
+        return [_saved(each) for each in cast("list[Any]", value)]
+    if isinstance(value, float) and not math.isfinite(value):
+        raise StorageError(f"the session holds a value that no file can: {value}")
+    return value
+
+
+def _part_of(_: type[FeaturePart], saved: dict[str, Any]) -> FeaturePart:
+    """Return the part of a state within another value."""
+    return msgspec.convert(saved, FEATURE_PARTS[saved.pop(PART)], dec_hook=_part_of)

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from explorer.app.session.history import History
-from explorer.app.state.state import State
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.errors import ExplorerError
@@ -65,13 +64,9 @@ class Autosaver:
         self._thread = threading.Thread(target=self._run, name="autosave", daemon=True)
         self._thread.start()
 
-    def follow(self, state: State, history: History) -> None:
-        """Queue a history to be saved if it has changed, in place of one that waits.
-
-        A search for a better design is no step before it ends: until then the file holds the
-        session before it.
-        """
-        if history is not self._newest and not state.optimisation.is_on:
+    def follow(self, history: History) -> None:
+        """Queue a history to be saved if it has changed, in place of one that waits."""
+        if history is not self._newest:
             self._newest = history
             self._changed.set()
 

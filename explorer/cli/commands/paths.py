@@ -147,7 +147,7 @@ def _path_json(
 ) -> dict[str, object]:
     names = "time joints position quaternion" + (" tool_position" if path.tool else "")
     largest = loads and {
-        "largest_share": loads.share,
+        "largest_share": loads.utilisation,
         "largest_share_bound": loads.bound,
         "largest_share_part": None if loads.part is None else LIMITED[loads.part],
         "largest_share_at": loads.place,
@@ -185,7 +185,7 @@ def _path_lines(
         ("least |δ|", "  ".join(f"δ{i + 1} {output.figure(v)}" for i, v in enumerate(least))),
     ]
     if loads is not None:
-        words = f"held, with {100.0 * loads.share:.1f} % of a limit"
+        words = f"held, with {100.0 * loads.utilisation:.1f} % of a limit"
         words += f" at {len(loads.at)} samples and {100.0 * loads.bound:.1f} % at most between them"
         if loads.part is not None:
             seconds = float(np.interp(loads.place, timed.at, timed.time))

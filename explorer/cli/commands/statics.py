@@ -116,8 +116,9 @@ class Forces(LoadOptions):
 def _forces_json(
     found: loaded.LoadedPose, worst: forces.WorstDirection, added: loaded.WorstForce | None
 ) -> dict[str, object]:
-    reactions, share, by_unit = found.reactions, float(worst.share), found.unit_force.share
-    is_limiting = added is not None and added.share > 0.0
+    reactions, by_unit = found.reactions, found.unit_force.utilisation
+    share = float(worst.utilisation)
+    is_limiting = added is not None and added.utilisation > 0.0
     return {
         "actuator_forces": reactions.actuators,
         "strut_bending": reactions.bending,
@@ -136,7 +137,7 @@ def _forces_json(
         and {
             "direction": added.direction if is_limiting else None,
             "part": LIMITED[added.part] if is_limiting else None,
-            "share": added.share,
+            "share": added.utilisation,
         },
     }
 

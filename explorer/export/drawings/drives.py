@@ -14,7 +14,7 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.paths.drives import PARTS, Drives
+from explorer.paths.drives import PARTS, PathDrives
 from explorer.singularity.colours import Rgb, css
 
 # The width of the charts, the height of one over time and of that of forces and speeds, and the
@@ -31,7 +31,7 @@ _LOOKS = [
 ROOM = 0.06
 
 
-def time_charts(drives: Drives) -> Element:
+def time_charts(drives: PathDrives) -> Element:
     """Return speeds, forces and powers of the actuators over time, one below the other."""
     pieces, top = [*_legend()], LEGEND
     charts = (
@@ -48,7 +48,7 @@ def time_charts(drives: Drives) -> Element:
     return _svg(top + BELOW, "Speeds, forces and powers of the actuators over time", pieces)
 
 
-def force_speed_chart(drives: Drives) -> Element:
+def force_speed_chart(drives: PathDrives) -> Element:
     """Return the forces of the actuators against their speeds, with the limits as a box."""
     push, pull = drives.design.actuators.limits
     speed = or_infinite(drives.design.actuators.speed_mm_s)

@@ -139,14 +139,14 @@ def largest_loads(loaded: LoadedPose) -> block.Facts:
         "Largest force at the tool, alone, that all parts hold in every direction, and the part "
         "that gives way first"
     )
-    force = _largest_force(unit.share, unit.direction, PART_NAMES[unit.part], hint)
+    force = _largest_force(unit.utilisation, unit.direction, PART_NAMES[unit.part], hint)
     return block.Facts("Most that is held here", (largest, *force))
 
 
 def most_of_actuators(worst: WorstDirection) -> block.Facts:
     """Return the largest force in every direction that the actuators alone hold."""
     part = f"actuator {JOINTS[int(worst.actuator)]}"
-    facts = (*_largest_force(float(worst.share), worst.direction, part),)
+    facts = (*_largest_force(float(worst.utilisation), worst.direction, part),)
     return block.Facts("Most that the actuators hold", facts)
 
 
@@ -169,7 +169,7 @@ def worst_force(worst: WorstForce, force: str) -> Iterator[block.Fact]:
     There is none in a singular pose or without limits.
     """
     if np.isfinite(worst.direction).all():
-        remark = f"{PART_NAMES[worst.part]} at ", block.Share(worst.share)
+        remark = f"{PART_NAMES[worst.part]} at ", block.Share(worst.utilisation)
         yield block.Fact(f"worst direction of {force}", _along(worst.direction), remark, act="turn")
 
 

@@ -132,7 +132,8 @@ class ClearanceDemand(Demand):
     def find_unproven(self, state: State) -> list[Proof]:
         """Return the pairs that are, or may be, too near in the workspace, and look there too."""
         least = least_clearances(
-            state.workspace,
+            state.design,
+            state.rotation,
             BETWEEN * self.clearance,
             below=self.clearance,
             margin=state.problem.demands.clearance_margin,
@@ -315,14 +316,14 @@ class LoadDemand(StaticsDemand):
         return box.node_utilisations
 
     def _rows(self, positions: FloatArray) -> tuple[IntArray, IntArray]:
-        """Return the position and the part of each value, as in `share_slopes`."""
+        """Return the position and the part of each value, as in `utilisation_slopes`."""
         count = len(positions)
         return np.repeat(np.arange(count), len(self.limited)), np.tile(self.limited, count)
 
     def _spares(self, state: State, positions: FloatArray) -> Measured:
         design, rotation, parts = state.design, state.rotation, self._rows(positions)
         twists = slopes.twist_slopes(design, positions, rotation)
-        share, by = slopes.share_slopes(design, rotation, twists, parts, self.limits)
+        share, by = slopes.utilisation_slopes(design, rotation, twists, parts, self.limits)
         return _spare(share, by @ state.rows(CHAIN))
 
     def _prove(self, state: State, most: float) -> list[Proof]:

@@ -11,14 +11,15 @@ from typing import ClassVar
 import viser
 
 from explorer.app.features.compare.scene import SCENES
+from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.compare.table import Column, bars, columns_of, notes, table
 from explorer.app.features.compare.work import FEEDS, draw_compared
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.session.session import Change
 from explorer.app.state.actions import Action, Open
-from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import without_name
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
@@ -47,8 +48,8 @@ class Pin(Action):
         Raises:
             InputError: The design is pinned already, or no place is free.
         """
-        pinned, name = state.compared.pinned, self.design.name
-        slot = state.compared.slot_of(self.design)
+        pinned, name = Compared.of(state).pinned, self.design.name
+        slot = Compared.of(state).slot_of(self.design)
         if slot is not None:
             raise InputError(
                 f"{name} is pinned already, as {SLOTS[slot]}; change it, or pin another design"
@@ -76,7 +77,7 @@ class Unpin(Action):
 
 
 def _has_pinned(state: State) -> bool:
-    return not state.compared.is_empty
+    return not Compared.of(state).is_empty
 
 
 def _look(
@@ -112,7 +113,7 @@ LOOKS = (
         "Draw the workspace of the live design at its present orientation, rather than at home.",
         turn("compared.look.at_pose", "Live one as it is turned"),
         "live as turned",
-        lambda state: state.compared.look.overlay,
+        lambda state: Compared.of(state).look.overlay,
     ),
     _look(
         "Outlines",
@@ -138,7 +139,7 @@ class ComparePanel:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
-        compared = frame.state.compared
+        compared = Compared.of(frame.state)
         choices = self._choices()
         columns = columns_of(frame.state, self._feeds)
         key = (columns, compared, tuple(choices), frame.state.design.name)
@@ -152,7 +153,7 @@ class ComparePanel:
             "Compare › Pin this design",
             "Keep a copy of the live design as it is now, to compare it with what it becomes.",
             "compare.pin",
-            is_ready=lambda: None in self._session.state.compared.pinned,
+            is_ready=lambda: None in Compared.of(self._session.state).pinned,
         )
         places: tuple[tuple[str, Callable[[State, int], Action], str, str], ...] = (
             (
@@ -181,15 +182,15 @@ class ComparePanel:
                     hint,
                     name,
                     place,
-                    lambda slot=slot: self._session.state.compared.pinned[slot] is not None,
+                    lambda slot=slot: Compared.of(self._session.state).pinned[slot] is not None,
                 )
 
     def _page(
         self, state: State, columns: tuple[Column, ...], choices: Mapping[str, Design]
     ) -> str:
-        look = state.compared.look
+        look = Compared.of(state).look
         pins = _pin_buttons(state, choices)
-        if state.compared.is_empty:
+        if Compared.of(state).is_empty:
             return box(
                 '<div class="ex-before">Pin this design, then change it: the copy stays beside it. '
                 "Or pin another one to compare this design with it. Up to three can be pinned; "
@@ -229,7 +230,7 @@ class ComparePanel:
 
 
 def _open(state: State, slot: int) -> Open:
-    design = state.compared.pinned[slot]
+    design = Compared.of(state).pinned[slot]
     if design is None:
         raise InputError(f"nothing is pinned as {SLOTS[slot]}; pin a design first")
     return Open(design)
@@ -237,7 +238,7 @@ def _open(state: State, slot: int) -> Open:
 
 def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
     """Return the buttons that pin the live design and others, as HTML."""
-    compared = state.compared
+    compared = Compared.of(state)
     is_full = None not in compared.pinned
     hint = "All three places are taken: unpin one first" if is_full else "Keep a copy as it is now"
     live = press_button(

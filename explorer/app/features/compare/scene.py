@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.app.features.compare import work
+from explorer.app.features.compare.state import Compared
 from explorer.app.features.compare.work import LIVE, NAMES
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
@@ -69,7 +70,7 @@ class ComparedScene(ScenePart):
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the design in this frame."""
-        compared, placement = placed.frame.state.compared, self._place(placed)
+        compared, placement = Compared.of(placed.frame.state), self._place(placed)
         workspace = placement[0].workspace if placement and compared.look.overlay else None
         for handle in (self._mesh, self._label):
             yield handle, "visible", workspace is not None
@@ -93,7 +94,7 @@ class ComparedScene(ScenePart):
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of the box about the workspace, if it is drawn."""
         placement = self._place(placed)
-        if placement is None or not placed.frame.state.compared.look.overlay:
+        if placement is None or not Compared.of(placed.frame.state).look.overlay:
             return NO_POINTS
         return placement[0].corners + placement[1]
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
+from explorer.app.features.compare.state import Compared
 from explorer.app.features.compare.work import LIVE, NAMES, CompareFeed, drawing_in
 from explorer.app.scene.shapes import COMPARED
 from explorer.app.state.state import State
@@ -105,7 +106,7 @@ class Column:
 def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[Column, ...]:
     """Return the columns of the live design and of the pinned ones, given the feed of each."""
     columns: list[Column] = []
-    designs = (state.design, *state.compared.pinned)
+    designs = (state.design, *Compared.of(state).pinned)
     for number, (design, feed) in enumerate(zip(designs, feeds, strict=True)):
         if design is not None:
             drawing = drawing_in(number, feed)

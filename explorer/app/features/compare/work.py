@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, kept_workspace, rows_of
+from explorer.app.features.compare.state import SLOTS, Compared
+from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, rows_of
 from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
 from explorer.app.session.feed import Feed
-from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import without_name
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
@@ -28,7 +29,8 @@ from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import Rgb
-from explorer.workspace.solids.solids import whole_solid
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import workspace_solid
 
 if TYPE_CHECKING:
     # The process of the worker needs no viser.
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
 LIVE, NAMES = 0, ("live", *SLOTS)
 """The column of the live design, and the short names of all columns."""
 
-# Number of cases that are kept: of the compared designs, and of the last changes.
+# Number of cached measurements and solids: of the compared designs, and of the last changes.
 CACHED = 8
 NO_COLOUR: Rgb = (0, 0, 0)
 
@@ -91,12 +93,9 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
     shell: Shell | None = None
     problem: str | None = None
     try:
-        case = _kept_case(design)
-        measurements = measure_design(case, measures_in("compare"))
+        measurements = _measure(design, tuple(measures_in("compare")))
         if request.drawn:
-            rows = request.rotation
-            workspace = case.workspace if rows is None else kept_workspace(design, rows)
-            solid = whole_solid(workspace, request.tolerance or LIVE_TOLERANCE * design.reach)
+            solid = _solid(design, request.rotation, request.tolerance)
             if not solid.is_empty:
                 shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
@@ -105,8 +104,15 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
     return ComparedDrawing(request, measurements, shell, lines, problem)
 
 
-_kept_case = lru_cache(maxsize=CACHED)(Case)
-"""The case of a design, with all that has been computed of it."""
+@lru_cache(maxsize=CACHED)
+def _measure(design: Design, names: tuple[str, ...]) -> Measurements:
+    return measure_design(Case(design), names)
+
+
+@lru_cache(maxsize=CACHED)
+def _solid(design: Design, rotation: Rows | None, tolerance: float | None) -> Solid:
+    r = design.home_pose.rotation if rotation is None else np.array(rotation)
+    return workspace_solid(design, r, tolerance or LIVE_TOLERANCE * design.reach)
 
 
 CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]
@@ -124,7 +130,7 @@ FEEDS: tuple[Callable[[Services], CompareFeed], ...] = tuple(
 
 
 def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
-    state, compared = frame.state, frame.state.compared
+    state, compared = frame.state, Compared.of(frame.state)
     design = design_in(column, state)
     if compared.is_empty or design is None:
         return None
@@ -141,7 +147,7 @@ def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
 
 def design_in(column: int, state: State) -> Design | None:
     """Return the design of a column; None if nothing is pinned there."""
-    return (state.design, *state.compared.pinned)[column]
+    return (state.design, *Compared.of(state).pinned)[column]
 
 
 def drawing_in(column: int, feed: CompareFeed) -> ComparedDrawing | None:

@@ -229,7 +229,7 @@ class DesignsPanel:
             "Name",
             "Name of the live design, under which it is saved.",
             Bound(lambda frame: frame.state.design.name, lambda _, name: SetName(name)),
-            disabled=lambda state: state.optimisation.is_on,
+            disabled=lambda state: bool(state.busy),
         )
         actions: dict[str, Callable[[Who], None]] = {
             "Save": lambda who: saved.save(session.latest_state().design, who),

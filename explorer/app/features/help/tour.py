@@ -20,7 +20,6 @@ import viser
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import CancelRun, Revert, StartRun, TakePaperProblem
 from explorer.app.features.optimise.state import Optimisation, SearchRun
-from explorer.app.session.history import restore, start_history
 from explorer.app.state.actions import Action, GoHome, Set, SetPosition, SetVariable, move_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import take_back, with_value
@@ -87,8 +86,7 @@ class EndTour(Action):
             after = with_value(Revert().apply(state), "optimisation.run", None)
         for change in reversed(self.changes):
             after = _take_back(change, after)
-        restored, _ = restore(start_history(after), state)
-        return replace(restored, view=after.view)
+        return replace(after.for_step().restore_over(state), view=after.view)
 
 
 def own_search(state: State, changes: Sequence[Change]) -> SearchRun | None:
@@ -269,7 +267,7 @@ class TourGuide(Runner):
         self._end(client.client_id)
         # Not within the lock: the session waits for that while it draws.
         state = self._session.latest_state()
-        if state.optimisation.is_on:
+        if state.busy:
             self._services.complain(BUSY, client.client_id)
             return
         with self._lock:
@@ -282,7 +280,7 @@ class TourGuide(Runner):
         with self._lock:
             for card in tuple(self._cards.values()):
                 card.show(card.tour.after_frame(frame))
-            if not frame.state.optimisation.is_on:
+            if not frame.state.busy:
                 ended, self._ended = self._ended, []
                 for card in ended:
                     self._session.do(partial(self._take_back, card), who=card.client.client_id)
@@ -324,7 +322,7 @@ class TourGuide(Runner):
 
     def _press(self, name: str, client: viser.ClientHandle) -> None:
         card = self._cards.get(client.client_id)
-        if name == OFFER and not self._session.state.optimisation.is_on:
+        if name == OFFER and not self._session.state.busy:
             self.begin(client)
         if card is None:
             return
@@ -338,7 +336,7 @@ class TourGuide(Runner):
                 self._do(card, lambda _: step.after)
             tour = card.tour.step_by(1 if name == "Next" else -1, Frame(self._session.state))
             first = tour.step.before
-            self._do(card, lambda state: None if state.optimisation.is_on else first)
+            self._do(card, lambda state: None if state.busy else first)
             with self._lock:
                 card.show(tour)
 

@@ -18,7 +18,7 @@ from explorer.app.features.workspace.work import MeasuredVolume, Selection, meas
 from explorer.app.scene.placing import Placed, ScenePart, outline
 from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.session.feed import Feed
-from explorer.app.session.history import History, Step, restore
+from explorer.app.session.history import History, Step
 from explorer.app.session.session import REDO, UNDO, move_to
 from explorer.app.state.actions import Action, Open
 from explorer.app.state.frame import Frame
@@ -131,7 +131,7 @@ class UndoButtons:
 
     def __call__(self, frame: Frame) -> str:
         """Return the buttons for a frame, as HTML."""
-        history, is_busy = self._session.history, frame.state.optimisation.is_on
+        history, is_busy = self._session.history, bool(frame.state.busy)
         buttons = "".join(self._button(name, history, is_busy=is_busy) for name in MOVES)
         steps = open_button(
             "History",
@@ -284,7 +284,7 @@ class OpenSession(Open):
         Raises:
             InputError: The design is being optimised.
         """
-        return replace(restore(self.history, state)[0], view=self.history.step.state.view)
+        return replace(self.history.restore(state).step.state, view=self.history.step.state.view)
 
 
 def open_session(_: Services, data: bytes, name: str) -> tuple[Action, str]:

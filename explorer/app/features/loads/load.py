@@ -11,8 +11,8 @@ import numpy as np
 from explorer.app.scene.placing import round_step
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.actions import Action
-from explorer.app.state.compared import without_name
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import without_name
 from explorer.app.state.state import State
 from explorer.measures.blocks.source import LoadTopic, Source, load_source
 from explorer.mechanism.design import Design

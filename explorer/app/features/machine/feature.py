@@ -16,7 +16,7 @@ from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.inputs.controls import At, Bound, item
 from explorer.app.inputs.ranges import Span, platform_span
-from explorer.app.state.actions import FULL_TURN, Action, Set, check_free
+from explorer.app.state.actions import FULL_TURN, Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import ClearMachine
 from explorer.app.state.parts import with_value
@@ -67,7 +67,7 @@ class SetToolAngle(Action):
         Raises:
             InputError: The angle is not finite, or the design is being optimised.
         """
-        check_free(state)
+        state.check_free()
         angles = with_value(state.tool_angles, str(self.axis), self.value)
         quaternion = Pose.of_yaw_pitch_roll((0.0, 0.0, 0.0), angles).quaternion
         changed = with_value(state, "design.tool.quaternion", quaternion)

@@ -14,7 +14,7 @@ import numpy as np
 
 from explorer.app.features.optimise.state import PLACE, Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, problem_of
-from explorer.app.state.actions import Action, Open, Set, check_free, move_to
+from explorer.app.state.actions import Action, Open, Set, move_to
 from explorer.app.state.geometry import with_machine
 from explorer.app.state.parts import parts_kept_on_open, value_at, with_value
 from explorer.app.state.state import State
@@ -66,7 +66,7 @@ class StartRun(Action):
         impossible = find_refusals(state)
         if impossible:
             raise NoAnswerError("; ".join(refusal.message for refusal in impossible))
-        own = replace(state, optimisation=Optimisation(optimisation.request))
+        own = with_value(state, "optimisation", Optimisation(optimisation.request))
         if optimisation.undecided is not None:
             # A result that is not accepted is not yet a design of the user.
             own = optimisation.undecided.own
@@ -78,7 +78,8 @@ class StartRun(Action):
         )
         # The run shows its workspace.
         shown = with_value(state, "view.workspace.solid", True)
-        return replace(shown, optimisation=Optimisation(optimisation.request, run, run.number))
+        searching = Optimisation(optimisation.request, run, run.number)
+        return with_value(shown, "optimisation", searching)
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ class LiftLimit(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; refuse during a run, or if the design has no such limit."""
-        check_free(state)
+        state.check_free()
         design = conflicts.without_limit(state.design, self.limit)
         if design is None:
             raise InputError(f"the design has no limit named {self.limit!r} to lift")
@@ -131,7 +132,7 @@ class TakePaperBox(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; refuse while the design is being optimised."""
-        check_free(state)
+        state.check_free()
         return replace(state, design=with_box(state.design, conflicts.PAPER_BOX))
 
 
@@ -141,7 +142,7 @@ class CancelRun(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        if not state.optimisation.is_on:
+        if not Optimisation.of(state).is_on:
             return state
         return with_value(state, "optimisation.run.phase", "cancelling")
 
@@ -249,8 +250,9 @@ def _running(state: State, number: int) -> SearchRun | None:
 def _restore_own(state: State, own: State) -> State:
     """Return the user's own state with the present view."""
     present = state.in_unit_of(own.design)
-    others = {"optimisation": present.optimisation, "paths": own.paths}
-    return replace(own, **parts_kept_on_open(present) | others)
+    # A path belongs to the design that it was made for.
+    parts = {**present.parts, "paths": own.parts["paths"]}
+    return replace(own, **parts_kept_on_open(present) | {"parts": parts})
 
 
 def _with_design(state: State, design: Design) -> State:

@@ -62,7 +62,7 @@ BUTTONS: Mapping[str, Button] = {
     START: Button(
         "Optimise",
         "Search for the best design from the present one; its limits hold throughout.",
-        lambda state: not (state.optimisation.is_on or work.find_refusals(state)),
+        lambda state: not (Optimisation.of(state).is_on or work.find_refusals(state)),
         lambda _, __: actions.StartRun(),
         (Key("O"),),
     ),
@@ -84,7 +84,7 @@ BUTTONS: Mapping[str, Button] = {
         "The paper's problem",
         "Open the paper's initial design within the box of its optimum, and ask for its volume of "
         "8,000 cm³ with a clearance of 2 mm; one undo brings your design back.",
-        lambda state: not state.optimisation.is_on,
+        lambda state: not Optimisation.of(state).is_on,
         lambda _, __: actions.TakePaperProblem(),
     ),
     PAPER_BOX: Button(

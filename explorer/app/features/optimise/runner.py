@@ -79,7 +79,7 @@ class Optimiser(Runner):
 
     def finish(self) -> None:
         """Cancel a search that goes on, which keeps its best iterate."""
-        if self._session.state.optimisation.is_on:
+        if Optimisation.of(self._session.state).is_on:
             self._session.do(CancelRun())
             self._wait_for_end(time.monotonic() + LONGEST_END)
             # The end is saved once it is drawn.
@@ -92,7 +92,7 @@ class Optimiser(Runner):
         return self.worker.wait_until_idle(deadline - time.monotonic())
 
     def _wait_for_end(self, deadline: float) -> None:
-        while self._session.state.optimisation.is_on and time.monotonic() < deadline:
+        while Optimisation.of(self._session.state).is_on and time.monotonic() < deadline:
             time.sleep(WAIT_SECONDS)
 
     def stop(self) -> None:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import msgspec
 
-from explorer.app.state.parts import LENGTHS, TRANSIENT, VOLUME
-from explorer.app.state.state import OptimisationPart, State
+from explorer.app.state.parts import LENGTHS, TRANSIENT, VOLUME, FeaturePart
+from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.measures.catalogue import Measurements
 from explorer.mechanism.design import VARIABLES
@@ -147,7 +147,7 @@ class SearchRun:
     accepted: bool = False
 
     def __post_init__(self) -> None:
-        if self.own.optimisation.own is not None:
+        if Optimisation.of(self.own).run is not None:
             raise InputError("the state before a run has none itself")
         if self.phase == "ended" and self.verdict is None:
             raise InputError(f"run {self.number} has ended without a verdict")
@@ -170,7 +170,7 @@ class SearchRun:
 
 
 @dataclass(frozen=True)
-class Optimisation(OptimisationPart):
+class Optimisation(FeaturePart, name="optimisation"):
     """The request for an optimisation, and its last run.
 
     Attributes:
@@ -195,18 +195,17 @@ class Optimisation(OptimisationPart):
         return run if run is not None and run.best is not None and not run.accepted else None
 
     @property
-    def own(self) -> State | None:
-        """The state before the last run; None without a run."""
-        return None if self.run is None else self.run.own
+    def busy(self) -> str:
+        """Why the design cannot be changed now, as a clause; "" if it can."""
+        return "the design is being optimised" if self.is_on else ""
 
-    def without_run(self) -> Optimisation:
+    def on_open(self) -> Self:
         """Return what stays when another design is opened: the request and the count of runs."""
         return replace(self, run=None)
 
-    def continue_numbers(self, other: OptimisationPart) -> Optimisation:
-        """Return this part whose next run has a number above those of another part, too."""
-        count = other.count if isinstance(other, Optimisation) else 0
-        return replace(self, count=max(self.count, count))
+    def continue_from(self, present: Self) -> Self:
+        """Return this part whose next run has a number above those of the present one, too."""
+        return replace(self, count=max(self.count, present.count))
 
     @property
     def record(self) -> Record | None:

@@ -63,7 +63,7 @@ def search_notice(state: State) -> Notice | None:
     run = Optimisation.of(state).run
     if run is None:
         return None
-    if not state.optimisation.is_on:
+    if not Optimisation.of(state).is_on:
         if run.verdict is None or run.best is None or run.accepted:
             return None
         value = _reached_text(run.problem, run.best, state)
@@ -108,7 +108,7 @@ def result_words(state: State, built: str = "") -> str:
     a search that succeeded, then the search itself.
     """
     run, notice = Optimisation.of(state).run, search_notice(state)
-    if notice is not None and state.optimisation.is_on:
+    if notice is not None and Optimisation.of(state).is_on:
         return markup.box(
             f'<div class="ex-line"><div class="ex-strong">{escape(notice.title)}</div>'
             f"{buttons.button(buttons.CANCEL, state)}</div>",

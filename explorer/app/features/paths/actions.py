@@ -9,8 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from explorer.app.features.loads.load import weights_of_parts
+from explorer.app.features.paths.state import End, Journey, Paths, journey_of
 from explorer.app.state.actions import Action, Set, move_to
-from explorer.app.state.paths import End, Journey, Paths
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import Joints, State, joints_of
 from explorer.app.state.view import Weighed
 from explorer.errors import InputError
@@ -46,26 +47,26 @@ class Go(Action):
             )
         # A goal that follows the present mode would be another one as soon as the platform moves.
         chosen = goal_of(state)
-        if state.paths.kind == "planned":
+        if Paths.of(state).kind == "planned":
             return _with(
                 state,
                 goal=chosen,
-                request=state.paths.request + 1,
+                request=Paths.of(state).request + 1,
                 planning=(start, goal),
                 problem=None,
                 journey=None,
             )
-        title = f"{_end_words(state.paths.start).capitalize()} to {_end_words(chosen)}"
+        title = f"{_end_words(Paths.of(state).start).capitalize()} to {_end_words(chosen)}"
         path = Journey(
             "straight", title, state.design, (start, goal), is_playing=True, tool=state.tool
         )
         after = move_to(_with(state, goal=chosen, problem=None, planning=None, journey=path), start)
-        mode = state.paths.start
+        mode = Paths.of(state).start
         return replace(after, mode=mode) if isinstance(mode, int) else after
 
     def describe(self, after: State) -> str:
         """Return which path was played or requested."""
-        journey = after.journey
+        journey = journey_of(after)
         return "Plan a path" if journey is None else journey.title
 
 
@@ -78,12 +79,13 @@ class SetEnd(Set):
 
 def goal_of(state: State) -> Pose | int:
     """Return the goal of the next path; where none is chosen, the mode beyond δ1 = 0."""
-    return state.mode ^ 4 if state.paths.goal is None else state.paths.goal
+    goal = Paths.of(state).goal
+    return state.mode ^ 4 if goal is None else goal
 
 
 def ends_of(state: State) -> tuple[Pose, Pose]:
     """Return the poses between which the next path leads; errors are those of `pose_of_end`."""
-    return pose_of_end(state, state.paths.start), pose_of_end(state, goal_of(state))
+    return pose_of_end(state, Paths.of(state).start), pose_of_end(state, goal_of(state))
 
 
 def pose_of_end(state: State, end: End) -> Pose:
@@ -110,7 +112,7 @@ def _legs(state: State) -> Joints:
 
     During a straight path between two modes of equal leg lengths, they are those lengths.
     """
-    journey = state.journey
+    journey = journey_of(state)
     if journey is not None and journey.kind == "straight" and journey.pose == state.pose:
         first, last = (joints_of(state.design, pose) for pose in journey.poses)
         if np.abs(np.subtract(first, last)).max() <= SAME * state.design.reach:
@@ -177,7 +179,7 @@ class Advance(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        journey = state.journey
+        journey = journey_of(state)
         if journey is None or not journey.is_playing:
             return state
         at = min(journey.at + self.seconds, journey.trajectory.duration)
@@ -197,18 +199,19 @@ class TakePlan(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state, at the start of the path."""
-        paths = state.paths
+        paths = Paths.of(state)
         if self.request != paths.request or not paths.is_planning:
             return state
         problem = self.problem
         if self.journey is not None and self.journey.design != state.design:
             problem = "the design has changed meanwhile; press Go again"
         after = _with(state, planning=None, problem=problem, journey=self.journey)
-        return after if after.journey is None else move_to(after, after.journey.pose)
+        journey = journey_of(after)
+        return after if journey is None else move_to(after, journey.pose)
 
 
 def _journey(state: State) -> Journey:
-    journey = state.journey
+    journey = journey_of(state)
     if journey is None:
         raise InputError("there is no path for this design; press Go to make one")
     return journey
@@ -220,8 +223,8 @@ def _go_along(state: State, journey: Journey) -> State:
 
 
 def _with(state: State, **changes: object) -> State:
-    paths: Paths = replace(state.paths, **changes)  # pyright: ignore[reportArgumentType]
-    return replace(state, paths=paths)
+    paths: Paths = replace(Paths.of(state), **changes)  # pyright: ignore[reportArgumentType]
+    return with_value(state, "paths", paths)
 
 
 def plan(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from explorer.app.features.feature import Services, html_of, show_html
+from explorer.app.features.paths.state import Paths, journey_of
 from explorer.app.features.paths.work import DRIVES_FEED, DrivesDrawing
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
@@ -37,15 +38,15 @@ class DrivesPanel:
             "paths.duration",
             least=0.01,
             step=0.01,
-            visible=lambda state: state.paths.drives == "duration",
+            visible=lambda state: Paths.of(state).drives == "duration",
         )
         self._missing = extra_button("timing") if is_missing("timing") else ""
         self._html = services.gui.add_html("")
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
-        paths = frame.state.paths
-        if paths.drives == "off" or frame.state.journey is None:
+        paths = Paths.of(frame.state)
+        if paths.drives == "off" or journey_of(frame.state) is None:
             html = ""
         elif paths.drives == "shortest" and self._missing:
             html = self._missing

@@ -11,11 +11,11 @@ import viser
 from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab, show
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
+from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
 from explorer.app.features.paths.work import DRIVES_FEED, draw_drives
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
 from explorer.app.state.frame import Frame
-from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import activity, press_button
 from explorer.mechanism.configuration import position_of
@@ -46,7 +46,7 @@ class PathScene(ScenePart):
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the path of this frame."""
-        state, journey = placed.frame.state, placed.frame.state.journey
+        state, journey = placed.frame.state, journey_of(placed.frame.state)
         yield from show(journey is not None, self._line, self._label)
         crossings = () if journey is None else journey.margins.crossings[:MOST_CROSSINGS]
         yield from self._balls.show(bool(crossings))
@@ -68,11 +68,11 @@ class PathScene(ScenePart):
 def path_chip(frame: Frame) -> str:
     """Return the path that is planned or played and a button that ends it, as HTML; else ""."""
     state = frame.state
-    if state.paths.is_planning:
+    if Paths.of(state).is_planning:
         cancel = press_button("paths.cancel", "", "Cancel", class_name="ex-button")
-        words = f"{format_number(state.paths.seconds)} s at most"
+        words = f"{format_number(Paths.of(state).seconds)} s at most"
         return activity("Paths", "Planning a path", words, None, cancel)
-    journey = state.journey
+    journey = journey_of(state)
     if journey is None or not journey.is_playing:
         return ""
     pause = press_button("paths.play", "off", "Pause", class_name="ex-button")
@@ -97,7 +97,7 @@ class PathRunner(Runner):
 
     def follow(self, frame: Frame) -> None:
         """Start or stop playing and planning as a frame requests."""
-        journey, paths = frame.state.journey, frame.state.paths
+        journey, paths = journey_of(frame.state), Paths.of(frame.state)
         if journey is not None and journey.is_playing:
             self._play()
         else:
@@ -118,7 +118,7 @@ class PathRunner(Runner):
             self._thread.join(timeout=5.0)
 
     def _plan(self, state: State) -> None:
-        number, design, paths = self._request, state.design, state.paths
+        number, design, paths = self._request, state.design, Paths.of(state)
         tool, view = state.tool, state.view
         load = state.load if paths.holds_load else None
         weighed, density = view.forces.weighed, view.prototype.density
@@ -175,8 +175,8 @@ PATHS = Feature(
         StateCommand(
             "Paths › Play or pause",
             "Play the present path, or pause it.",
-            lambda state: Play(state.journey is None or not state.journey.is_playing),
-            lambda state: state.journey is not None,
+            lambda state: Play(not is_playing(state)),
+            lambda state: journey_of(state) is not None,
             (Key("P"),),
         ),
     ),

@@ -11,11 +11,11 @@ import viser
 from explorer.app.features.feature import Services, show_html
 from explorer.app.features.paths import actions, plots
 from explorer.app.features.paths.drives import DrivesPanel
+from explorer.app.features.paths.state import End, PathKind, Paths, journey_of
 from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.paths import End, PathKind
 from explorer.app.state.state import State, angles_of
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import extra_button, press_button
@@ -117,12 +117,9 @@ class PathsPanel:
                 "Time (s)",
                 "Time on the path. A straight path takes 8 s; on a planned one the fastest "
                 "actuator moves a tenth of the reach per second.",
-                Bound(
-                    lambda frame: 0.0 if frame.state.journey is None else frame.state.journey.at,
-                    lambda _, value: actions.SetPathTime(value),
-                ),
+                Bound(_time_played, lambda _, value: actions.SetPathTime(value)),
                 _time_span,
-                disabled=lambda state: state.journey is None,
+                disabled=lambda state: journey_of(state) is None,
             )
             self._incidences = (
                 plots.IncidencePlot(gui, plots.margins_in, has_times=False),
@@ -138,7 +135,7 @@ class PathsPanel:
             "Paths › Clear",
             "Remove the path and its line.",
             lambda _: CLEAR,
-            is_ready=lambda state: state.journey is not None,
+            is_ready=lambda state: journey_of(state) is not None,
         )
         buttons = services.buttons
         buttons.on("paths.export", self._export)
@@ -146,13 +143,13 @@ class PathsPanel:
             "Paths › Cancel planning",
             "Stop the search for a path.",
             "paths.cancel",
-            is_ready=lambda: self._session.state.paths.is_planning,
+            is_ready=lambda: Paths.of(self._session.state).is_planning,
         )
         buttons.offer(
             "Paths › Export CSV",
             "Save time, joints and pose along the path, evenly spaced in time.",
             "paths.export",
-            is_ready=lambda: self._session.state.journey is not None,
+            is_ready=lambda: journey_of(self._session.state) is not None,
         )
 
     def updates(self, frame: Frame) -> Updates:
@@ -162,10 +159,10 @@ class PathsPanel:
             is_typed = _is_typed(state, end)
             yield from show_html(handle, "" if is_typed else end_numbers(state, end))
         chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
-        missing = self._missing if state.paths.kind == "planned" else ""
+        missing = self._missing if Paths.of(state).kind == "planned" else ""
         kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>', missing)
         yield self._kinds, "content", kinds
-        yield self.go, "disabled", state.paths.is_planning
+        yield self.go, "disabled", Paths.of(state).is_planning
         title = plan_words(state) or path_title(state, self._loads.shares(frame), self._clear)
         yield self._title, "content", title
         yield from show_html(self._demand, plots.demand_note(state))
@@ -206,7 +203,7 @@ class PathsPanel:
 
     def _export(self, _: str, client: viser.ClientHandle) -> None:
         state = self._session.latest_state()
-        journey = state.journey
+        journey = journey_of(state)
         if journey is not None:
             unit_mm = 1.0 if state.view.lengths == "mm" else None
             data = trajectory_csv(journey.trajectory, unit_mm).encode()
@@ -229,7 +226,7 @@ def end_numbers(state: State, end: EndName) -> str:
 
 def kind_note(state: State) -> str:
     """Return whether a path of the chosen kind exists between the ends, as HTML."""
-    if state.paths.kind == "straight":
+    if Paths.of(state).kind == "straight":
         return markup.dim("May pass singular poses, which are marked.")
     try:
         start, goal = (
@@ -247,7 +244,7 @@ def kind_note(state: State) -> str:
 
 def plan_words(state: State) -> str | None:
     """Return the progress of planning, or why it led to no path, as HTML; None otherwise."""
-    paths = state.paths
+    paths = Paths.of(state)
     if paths.is_planning:
         cancel = press_button(
             "paths.cancel", "", "Cancel", hint="Stop the search", class_name="ex-button"
@@ -264,7 +261,7 @@ def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") 
 
     The button `clear` removes the path.
     """
-    journey = state.journey
+    journey = journey_of(state)
     if journey is None:
         return markup.box(markup.dim("No path yet. Choose a goal and press Go."))
     on, words, hint = (
@@ -289,7 +286,7 @@ def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") 
 
 
 def _end(state: State, end: EndName) -> End:
-    return state.paths.start if end == "start" else actions.goal_of(state)
+    return Paths.of(state).start if end == "start" else actions.goal_of(state)
 
 
 def _option(state: State, end: EndName) -> str:
@@ -339,11 +336,16 @@ def _set_typed(state: State, end: EndName, index: int, triple: Triple) -> Action
 
 
 def _is_planned(state: State) -> bool:
-    return state.paths.kind == "planned"
+    return Paths.of(state).kind == "planned"
+
+
+def _time_played(frame: Frame) -> float:
+    journey = journey_of(frame.state)
+    return 0.0 if journey is None else journey.at
 
 
 def _time_span(state: State) -> Span:
-    journey = state.journey
+    journey = journey_of(state)
     # Rounded up to whole steps, so that the end of the slider is a round number.
     seconds = 1.0 if journey is None else math.ceil(100.0 * journey.trajectory.duration) / 100.0
     return Span(0.0, max(seconds, 0.01), 0.01)

@@ -15,8 +15,8 @@ from viser import uplot
 
 from explorer.app.features.feature import Services, show_html
 from explorer.app.features.loads.load import Loads
+from explorer.app.features.paths.state import Journey, Paths, journey_of
 from explorer.app.state.frame import Frame
-from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
 from explorer.app.widgets.charts import (
     BLUE,
@@ -131,7 +131,7 @@ class JourneyLoads(NamedTuple):
 
 def load_words(loads: JourneyLoads) -> str:
     """Return the largest share of a limit along a path, its bound and its place, as HTML."""
-    share, bound, part = loads.path.share, loads.path.bound, loads.path.part
+    share, bound, part = loads.path.utilisation, loads.path.bound, loads.path.part
     at = f"at {format_decimals(loads.seconds, 2)} s"
     hint = ""
     if part is None:
@@ -146,7 +146,7 @@ def load_words(loads: JourneyLoads) -> str:
 
 def demand_note(state: State) -> str:
     """Return a hint that no limit can be exceeded by the load that a path must hold; else ""."""
-    paths = state.paths
+    paths = Paths.of(state)
     if has_limits(state.design) or not paths.holds_load or paths.kind != "planned":
         return ""
     return note("No part has a limit, so every load is held: see the tab Machine.")
@@ -221,7 +221,7 @@ class IncidencePlot:
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart and its legend show the frame."""
-        journey, quantity = frame.state.journey, self._quantity_in(frame.state.unit)
+        journey, quantity = journey_of(frame.state), self._quantity_in(frame.state.unit)
         yield from self._chart.show(incidence_columns(journey, quantity), is_visible=True)
         words = "" if journey is None else legend(journey.pose, quantity)
         yield from show_html(self._legend, words)
@@ -316,14 +316,14 @@ class LoadPlot:
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart show the frame."""
-        journey, loads = frame.state.journey, self.shares(frame)
+        journey, loads = journey_of(frame.state), self.shares(frame)
         if journey is None or loads is None:
             columns = blank_columns(2, (0.0, LEAST_TOP))
         else:
             # Room above the largest share and the limit, in percent.
-            top = float(np.clip(115.0 * loads.path.share, LEAST_TOP, MOST_TOP))
+            top = float(np.clip(115.0 * loads.path.utilisation, LEAST_TOP, MOST_TOP))
             # Far above the chart a line is as good as at infinity.
-            percent: FloatArray = np.minimum(100.0 * loads.path.shares.max(axis=1), 4.0 * top)
+            percent: FloatArray = np.minimum(100.0 * loads.path.utilisations.max(axis=1), 4.0 * top)
             share = np.append(percent, np.interp([journey.at] * 2, loads.time, percent))
             beyond = np.where(share > 100.0, share, np.nan)
             columns = time_columns(loads.time, (share, beyond), journey.at, (0.0, top))
@@ -334,7 +334,7 @@ class LoadPlot:
 
         They are computed anew if path or load change.
         """
-        journey, loaded = frame.state.journey, self._loads.of(frame)
+        journey, loaded = journey_of(frame.state), self._loads.of(frame)
         if journey is None or not has_limits(loaded.design):
             return None
         path = journey.kind, journey.design, journey.poses, journey.tool

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from explorer.app.features.paths.state import Paths, journey_of
 from explorer.app.session.feed import feed_of
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
@@ -28,7 +29,7 @@ class DrivesDrawing:
 
 def request_for(state: State) -> DrivesRequest | None:
     """Return the path of a state if speeds and forces along it are wanted, else None."""
-    journey, paths = state.journey, state.paths
+    journey, paths = journey_of(state), Paths.of(state)
     if journey is None or paths.drives == "off":
         return None
     duration = paths.duration if paths.drives == "duration" else None

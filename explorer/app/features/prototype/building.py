@@ -22,7 +22,7 @@ from explorer.mechanism.design import LENGTHS, Design
 from explorer.motion.chains import LEGS
 from explorer.numerics.number_text import format_decimals
 from explorer.prototype.fitting import Buildability, buildability
-from explorer.prototype.sizes import Stroke
+from explorer.prototype.sizes import StrokeRange
 
 MEND = "prototype.mend"
 FITTING, STROKES = "fitting", "strokes"
@@ -34,7 +34,7 @@ STROKES_HINT = (
 
 
 def _request_for(frame: Frame) -> Design | None:
-    return None if frame.state.optimisation.is_on else frame.state.design
+    return None if frame.state.busy else frame.state.design
 
 
 BuildFeed: TypeAlias = Feed[Design, Buildability]
@@ -144,5 +144,5 @@ def strokes_table(built: Buildability) -> str:
     return table(rows, ("actuator", "stroke, mm", "limits, mm"))
 
 
-def _span(stroke: Stroke) -> str:
+def _span(stroke: StrokeRange) -> str:
     return " to ".join(format_decimals(end, 1) for end in stroke)

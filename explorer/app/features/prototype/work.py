@@ -13,12 +13,12 @@ import numpy as np
 
 from explorer.app.scene.surfaces import Drawn, with_creases
 from explorer.app.session.feed import Feed, feed_of
-from explorer.app.state.compared import without_name
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import without_name
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
 from explorer.prototype.assembly import Prototype, bill_of_materials, make_prototype
-from explorer.prototype.shapes import Part
+from explorer.prototype.shapes import PrototypePart
 
 # Axis of the round bar in the frame of the part, for the kinds cut from one.
 ROUND = {"cylinder": 2, "rod": 2, "ball": 2, "carriage": 0}
@@ -69,7 +69,7 @@ def lines_of(prototype: Prototype) -> tuple[Line, ...]:
     return tuple(sorted(lines.values(), key=lambda line: ORDER.index(line.kind)))
 
 
-def stock_of(part: Part, unit_mm: float) -> tuple[float, ...]:
+def stock_of(part: PrototypePart, unit_mm: float) -> tuple[float, ...]:
     """Return the stock of a part as in `Line`; `unit_mm` is the millimetres in a design unit."""
     points = part.vertices * unit_mm
     lows, highs = points.min(axis=0), points.max(axis=0)

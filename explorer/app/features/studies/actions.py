@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 from explorer.app.features.studies.state import Brush, Studies, label_of
@@ -27,7 +27,8 @@ class OpenStudy(Action):
         """Return the next state, without the brushes and the pick of another study."""
         if self.name == Studies.of(state).name:
             return state
-        return replace(state, studies=Studies(name=self.name, plan=Studies.of(state).plan))
+        studies = Studies(name=self.name, plan=Studies.of(state).plan)
+        return with_value(state, "studies", studies)
 
     def words(self) -> str:
         """Return what the action does."""
@@ -50,7 +51,7 @@ class BrushAxes(Action):
         for brush in self.brushes:
             _check_ranges(brush)
             studies = studies.with_ranges(brush.axis, brush.ranges)
-        return replace(state, studies=studies)
+        return with_value(state, "studies", studies)
 
     def words(self) -> str:
         """Return what the action does."""

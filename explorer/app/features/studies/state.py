@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from explorer.app.state.state import StudiesPart
+from explorer.app.state.parts import FeaturePart
 from explorer.errors import InputError
 from explorer.measures.catalogue import CATALOGUE, measures_in, unmet_needs
 from explorer.measures.measure import Case
@@ -94,7 +94,7 @@ class StudyPlan:
 
 
 @dataclass(frozen=True)
-class Studies(StudiesPart):
+class Studies(FeaturePart, name="studies"):
     """The open study, and how it is shown.
 
     Attributes:

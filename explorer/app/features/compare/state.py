@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-import msgspec
-
+from explorer.app.state.geometry import without_name
+from explorer.app.state.parts import FeaturePart
 from explorer.mechanism.design import Design
 
 SLOTS = ("A", "B", "C")
@@ -34,7 +34,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Compared:
+class Compared(FeaturePart, name="compared"):
     """The designs that the live one is compared with, and how.
 
     Copies of designs are pinned in the order of `SLOTS`; None where a place is free.
@@ -55,8 +55,3 @@ class Compared:
             i for i, pinned in enumerate(self.pinned) if pinned and without_name(pinned) == plain
         )
         return next(slots, None)
-
-
-def without_name(design: Design) -> Design:
-    """Return a design without its name, on which nothing else depends."""
-    return msgspec.structs.replace(design, name="untitled")

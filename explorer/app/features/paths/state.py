@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Annotated, Literal, TypeAlias
+from typing import Literal, Self, TypeAlias
 
 import msgspec
 import numpy as np
 
-from explorer.app.state.parts import LENGTHS, TRANSIENT
+from explorer.app.state.parts import LENGTHS, TRANSIENT, FeaturePart
+from explorer.app.state.state import Mode, State
 from explorer.errors import InputError
 from explorer.legs.moves import StraightMoves, poses_between
 from explorer.mechanism.design import Design
@@ -25,9 +26,6 @@ from explorer.paths.crossings import PathMargins, path_margins
 from explorer.paths.planning import DEFAULT_SECONDS
 from explorer.paths.time_law import law_at_speed
 from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
-
-Mode = Annotated[int, msgspec.Meta(ge=0, le=7)]
-"""Index of an assembly mode."""
 
 PathKind = Literal["straight", "planned"]
 """The straight move between two poses, or a path without a singular pose."""
@@ -107,7 +105,7 @@ class Journey:
 
 
 @dataclass(frozen=True)
-class Paths:
+class Paths(FeaturePart, name="paths"):
     """The path of the page, and the settings of the next one.
 
     Attributes:
@@ -145,14 +143,42 @@ class Paths:
                     f"{what} needs a time above zero; got {format_number(seconds)} seconds"
                 )
 
-    def without_path(self) -> Paths:
+    def on_open(self) -> Self:
         """Return what stays when another design is opened: the settings of the next path."""
         return replace(self, planning=None, problem=None, journey=None)
+
+    def for_step(self) -> Self:
+        """Return what a step of the history keeps: without planning and playing."""
+        journey = None if self.journey is None else replace(self.journey, is_playing=False)
+        return replace(self, planning=None, journey=journey)
+
+    def continue_from(self, present: Self) -> Self:
+        """Return this part with the number of the present request, if it is above its own."""
+        return replace(self, request=max(self.request, present.request))
 
     @property
     def is_planning(self) -> bool:
         """Whether a path is being planned."""
         return self.planning is not None
+
+
+def journey_of(state: State) -> Journey | None:
+    """Return the present path; None where there is none, or one made for another design.
+
+    It stays while a payload and actuators are chosen for it.
+    """
+    journey, new = Paths.of(state).journey, state.design
+    if journey is None or journey.design == new:
+        return journey
+    carrying = {"payload": new.payload, "actuators": new.actuators}
+    is_for_it = msgspec.structs.replace(journey.design, **carrying) == new
+    return replace(journey, design=new) if is_for_it else None
+
+
+def is_playing(state: State) -> bool:
+    """Whether a path is being played."""
+    journey = journey_of(state)
+    return journey is not None and journey.is_playing
 
 
 @lru_cache(maxsize=MOST_CACHED)
