@@ -16,25 +16,20 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import NO_LOAD
 from explorer.motion.inverse_jacobian import load_array
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.computed_once import computed_once
 from explorer.statics import load_cases
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.nodes import Grid, make_grid
-from explorer.workspace.limits.constraints import (
-    Cone,
-    Constraint,
-    HalfSpace,
-    constraints,
-    orientation_of,
-    slacks,
-)
-from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.limits.constraints import Cone, HalfSpace
+from explorer.workspace.slices.volume import volume_of
 from explorer.workspace.solids.solid import Solid, Surface, carved_solid, cut_solid
-from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.solids.solids import whole_solid
+from explorer.workspace.workspace import Workspace
 
 # Least number of nodes on each axis of the last grid in the box about the part, and number of
 # nodes beyond it on either side.
@@ -87,12 +82,9 @@ def part_names(design: Design) -> tuple[str, ...]:
     return (*PART_NAMES[:6], *moments, *PART_NAMES[8:10])
 
 
+@computed_once
 def carried_region(
-    design: Design,
-    rotation: ArrayLike | None = None,
-    load: ArrayLike = (0.0,) * 6,
-    *,
-    tolerance: float | None = None,
+    workspace: Workspace, load: tuple[float, ...] = NO_LOAD, *, tolerance: float | None = None
 ) -> CarriedRegion:
     """Return the positions at which the machine carries a load within its limits.
 
@@ -104,26 +96,24 @@ def carried_region(
     on each axis of the workspace's extent and lie beyond the box about the others.
 
     Args:
-        design: The manipulator, with its payload and its limits.
-        rotation: Platform to base, shape (3, 3); that of the home pose if None.
+        workspace: The workspace of a design with its payload and its limits.
         load: (F; M) on the platform at the tool point, base axes, shape (6,), in N and N × unit.
         tolerance: Tolerance of the solid where other limits bound it, as in
             `explorer.workspace_solid`.
 
     Raises:
-        InputError: Not a rotation, a load that is not finite, or no usable tolerance.
+        InputError: A load that is not finite, or no usable tolerance.
         ExplorerError: A boolean fails.
     """
-    r = orientation_of(design, rotation)
-    w = load_array(load)
+    design, r, w = workspace.design, workspace.rotation, load_array(load)
     if design.limits.margin is None:
-        design = design.with_limits(margin=0.0)
-    exact = workspace_volume(design, r)
-    whole = workspace_solid(design, r, tolerance, volume=exact)
+        return carried_region(
+            Workspace(design.with_limits(margin=0.0), r), load, tolerance=tolerance
+        )
+    exact, whole = volume_of(workspace), whole_solid(workspace, tolerance)
     if whole.is_empty:
         return CarriedRegion(exact.volume, 0.0, whole)
-    case = load_cases.load_case(design, r, w)
-    local = _LocalLoad(case, r, constraints(design, r), part_names(design))
+    local = _LocalLoad(workspace, load_cases.load_case(design, r, w), part_names(design))
     solid = _carried_part(whole, local)
     if solid.is_empty:
         best = local.best_within(whole)
@@ -153,36 +143,31 @@ class _LocalLoad:
     """A load at one orientation, with the limits of the workspace there.
 
     Attributes:
+        workspace: The workspace.
         case: What `explorer.statics.load_cases.load_case` returns.
-        rotation: Platform to base, shape (3, 3).
-        limits: Limits of positions.
         part_names: Names of the parts that may give way.
     """
 
+    workspace: Workspace
     case: FloatArray
-    rotation: FloatArray
-    limits: tuple[Constraint, ...]
     part_names: tuple[str, ...]
 
     def shares(self, positions: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the largest shares of a limit at positions (n, 3), and the parts, (n,) each."""
-        return load_cases.largest_shares(self.case, self.rotation, positions)
-
-    def allows(self, positions: FloatArray) -> BoolArray:
-        """Return which positions (n, 3) keep the limits of the workspace, shape (n,)."""
-        return np.asarray((slacks(self.limits, positions) >= 0.0).all(axis=-1))
+        return load_cases.largest_shares(self.case, self.workspace.rotation, positions)
 
     def is_near(self, positions: FloatArray, distance: float) -> BoolArray:
         """Return which positions (n, 3) may be nearer to the workspace than a distance, (n,)."""
         # The slack of a cone is an angle.
-        limits = tuple(limit for limit in self.limits if not isinstance(limit, Cone))
-        return np.asarray((slacks(limits, positions) >= -distance).all(axis=-1))
+        is_length = [not isinstance(limit, Cone) for limit in self.workspace.limits]
+        slacks = self.workspace.slacks(positions)[..., is_length]
+        return np.asarray((slacks >= -distance).all(axis=-1))
 
     def best_within(self, whole: Solid) -> Best:
         """Return the best position found within the limits."""
         grid = make_grid(*whole.ends, COARSE, 0)
-        tried = np.vstack([whole.vertices, positions_within(whole, grid, self.allows)])
-        found = best_positions(tried, grid.step, self.shares, self.allows)
+        tried = np.vstack([whole.vertices, positions_within(whole, grid, self.workspace.contains)])
+        found = best_positions(tried, grid.step, self.shares, self.workspace.contains)
         return min(found, key=lambda best: best.share)
 
 
@@ -196,7 +181,7 @@ def _carried_part(whole: Solid, load: _LocalLoad) -> Solid:
     """
     grid = make_grid(*whole.ends, COARSE, 0)
     positions = grid.positions.reshape(-1, 3)
-    kept = positions[(load.shares(positions)[0] <= 1.0) & load.allows(positions)]
+    kept = positions[(load.shares(positions)[0] <= 1.0) & load.workspace.contains(positions)]
     if not len(kept):
         best = load.best_within(whole)
         if best.share > 1.0:
@@ -257,7 +242,7 @@ def _carve(near: Solid, load: _LocalLoad, nodes: int) -> tuple[Solid, FloatArray
     grid = make_grid(*near.ends, nodes, BEYOND)
     positions = grid.positions.reshape(-1, 3)
     limits = np.flatnonzero(np.isfinite(load.case[load_cases.LIMITS : load_cases.INWARD]))
-    values = load_cases.limit_values(load.case, load.rotation, limits, positions)
+    values = load_cases.limit_values(load.case, load.workspace.rotation, limits, positions)
     # Two limits may have the same surface, such as those of a part without a load of one direction.
     distinct = np.sort(np.unique(np.round(values, SAME_DIGITS), axis=0, return_index=True)[1])
     limits, values = limits[distinct], values[distinct].reshape(-1, *grid.counts)
@@ -268,7 +253,9 @@ def _carve(near: Solid, load: _LocalLoad, nodes: int) -> tuple[Solid, FloatArray
         nodes = np.rint((beside - grid.lows) / grid.step).astype(np.int64)
         chosen, projected = left[tuple(nodes.T)], points.copy()
         rows = points[chosen], beside[chosen], grid.step
-        projected[chosen] = load_cases.settle_on_limit(load.case, load.rotation, limit, *rows)
+        projected[chosen] = load_cases.settle_on_limit(
+            load.case, load.workspace.rotation, limit, *rows
+        )
         return projected
 
     def surfaces() -> Iterator[Surface]:

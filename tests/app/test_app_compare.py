@@ -60,7 +60,8 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import Unit
 from explorer.page.widgets.assigning import Assigner
 from explorer.statics.loaded import LoadedPose
-from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import node_count_of, workspace_volume
+from explorer.workspace.workspace import Workspace
 
 INITIAL, OPTIMAL = PRESETS.values()
 LISTED = measures_in("compare")
@@ -149,7 +150,7 @@ def test_table_shows_the_values_of_the_library(*, millimetres: bool) -> None:
     large = 1e-3 if millimetres else 1.0
     for place, design in enumerate((OPTIMAL, small, variant(3))):
         factor = design.unit_mm / (1.0 if millimetres else OPTIMAL.unit_mm)
-        nodes = workspace_nodes(design)
+        nodes = node_count_of(Workspace(design))
         expected = {
             f"volume {cubic}": large * workspace_volume(design).volume * factor**3,
             "nodes": nodes.count,

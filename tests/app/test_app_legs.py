@@ -59,7 +59,8 @@ from explorer.singularity.colours import OUTLINE, TUBE
 from explorer.workspace.accessible.nodes import StartError, check_start
 from explorer.workspace.accessible.radii import RadiusCurve
 from explorer.workspace.least_clearance import least_clearances
-from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.constraints import slacks
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -150,7 +151,7 @@ def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
     assert float(np.median(off)) < 1e-6
     assert float(np.quantile(off, 0.98)) < 0.1
     plain = shells[PLAIN].vertices[shells[PLAIN].faces].mean(axis=1)
-    limits = constraints(THICK.design, THICK.pose.rotation)
+    limits = Workspace(THICK.design, THICK.pose.rotation).limits
     on_limits = np.abs(slacks(limits, plain)).min(axis=-1)
     assert float(on_limits.max()) < 2.0 * work.PART_TOLERANCE * OPTIMAL.reach
     whole = drawing_of(show(THICK, region="limits"))
@@ -171,7 +172,7 @@ def test_cut_takes_one_side_and_maps_the_accessible_part(axis: int) -> None:
     points = np.full((3000, 3), level)
     flat = np.random.default_rng(axis).uniform(lows, highs, (len(points), 2))
     points[:, [first, second]] = flat
-    limits = constraints(THICK.design, THICK.pose.rotation)
+    limits = Workspace(THICK.design, THICK.pose.rotation).limits
     within = np.asarray((slacks(limits, points) >= 0.2).all(axis=-1))
     blocked = inside(path_points(drawing.slice_map, "is-blocked"), flat)[within]
     colliding = inside(path_points(drawing.slice_map, "is-colliding"), flat)[within]
@@ -277,11 +278,11 @@ def test_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
     assert drawing.part is None
     assert trouble is not None
     with pytest.raises(StartError) as refused:
-        check_start(state.design, state.pose.rotation, home)
+        check_start(Workspace(state.design, state.pose.rotation), home)
     assert trouble.reason == refused.value.in_millimetres
     assert "l4 = 130.1 mm is above its maximum 125 mm" in trouble.reason
     assert trouble.nearest is not None
-    check_start(state.design, state.pose.rotation, np.array(trouble.nearest))
+    check_start(Workspace(state.design, state.pose.rotation), np.array(trouble.nearest))
     assert drawing.mesh_volume == pytest.approx(whole.mesh_volume, rel=1e-4)
     assert nothing_words(drawing) == "Nothing is accessible from the home position"
     # The alert of the panel has these words.
@@ -394,7 +395,7 @@ def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
     assert number(rows[1][1]) == pytest.approx(OPTIMAL.unit_mm * expected.radius_at(0.99), rel=5e-3)
     assert rows[2][1] == "0"
     assert "touch within the limits, where z = 0: legs 1 and 4 at (0, 0, 0) mm" in html
-    least = least_clearances(OPTIMAL)
+    least = least_clearances(Workspace(OPTIMAL))
     for pair in (PAIRS.index((2, 4)), PAIRS.index((3, 4))):
         x, y = (format_number(OPTIMAL.unit_mm * float(v), 3) for v in least.position[pair, :2])
         assert f"legs {PAIRS[pair][0]} and {PAIRS[pair][1]} at ({x}, {y}, 0) mm" in html

@@ -98,9 +98,10 @@ from explorer.optimise.outcome import Iterate, compare_designs, curves_of
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
 from explorer.optimise.search.sqp import Trail
 from explorer.page.session.worker import Channel
-from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.constraints import slacks
 from explorer.workspace.limits.table import GAP
 from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -475,7 +476,7 @@ def test_suggested_values_suit_the_design(name: str) -> None:
     assert (lows < home.position).all()
     assert (home.position < highs).all()
     for corner in corners_of(box):
-        assert slacks(constraints(design, home.rotation), corner).min() >= 0.0
+        assert slacks(Workspace(design, home.rotation).limits, corner).min() >= 0.0
 
 
 @pytest.mark.parametrize("name", PRESETS)

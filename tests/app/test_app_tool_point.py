@@ -72,7 +72,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Assigner
-from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 TOOL: Triple = (1.0, 0.0, 3.0)
@@ -581,7 +581,7 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
             if at == "tool":
                 points = points - home.rotation @ np.array(design.tool.position)
             for p in points[:: len(points) // 50]:
-                slack = min(limit.slack(p) for limit in constraints(design, home.rotation))
+                slack = min(limit.slack(p) for limit in Workspace(design, home.rotation).limits)
                 assert abs(float(slack)) < 0.05 * design.reach
             corners = np.asarray(node["vertices"]) + node["position"]
             ends = [corners.min(axis=0), corners.max(axis=0)]

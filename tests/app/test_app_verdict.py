@@ -35,6 +35,7 @@ from explorer.numerics.number_text import Unit
 from explorer.singularity.colours import SINGULAR, WARN_SHARE, WARNED, css, proximity_colour
 from explorer.singularity.strata import COVERED, OF_INCIDENCES, incidences
 from explorer.workspace.position_bands import position_bands
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -114,7 +115,7 @@ def test_verdict_where_the_map_warns_is_never_clear(
     for design in PRESETS.values():
         rng, reach, place = np.random.default_rng(7), design.reach, design.home_pose
         warn_below = WARN_SHARE * reach if share is None else share * reach
-        bands = position_bands(design, place.rotation, measure, warn_below=warn_below)
+        bands = position_bands(Workspace(design, place.rotation), measure, warn_below=warn_below)
         points = rng.uniform([-reach, -reach, 0.0], reach, (500, 3))
         warned = points[bands.values(points) < 1.0][:30]
         assert len(warned) > 5

@@ -34,8 +34,9 @@ from explorer.numerics.arrays import FloatArray
 from explorer.page.session.worker import CancelledError, Channel, Worker
 from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.workspace.accessible.radii import with_radius
-from explorer.workspace.slices.volume import workspace_nodes
+from explorer.workspace.slices.volume import node_count_of
 from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME_ROWS = tuple(tuple(row) for row in OPTIMAL.home_pose.rotation.tolist())
@@ -136,7 +137,7 @@ def test_bands_of_margins_contain_the_values_of_their_colour(
 ) -> None:
     """Also within facets, which margins cross linearly and their minimum does not."""
     solid = workspace_solid(OPTIMAL, rotation, 0.3)
-    colouring = Colouring(OPTIMAL, rotation, "margin", warn_below)
+    colouring = Colouring(Workspace(OPTIMAL, rotation), "margin", warn_below)
     shells = colouring.shells(creased_faces(solid))
     rng = np.random.default_rng(3)
     for shell in shells:
@@ -154,7 +155,7 @@ def test_bands_meet_where_the_measure_is_their_level(colour: Any, cut: Any) -> N
     drawing = work.draw_workspace(a_request(colour=colour, cut=cut, level=None))
     request = drawing.request
     colouring = Colouring(
-        request.design, np.array(request.rotation), request.colour, request.warn_below
+        Workspace(request.design, np.array(request.rotation)), request.colour, request.warn_below
     )
     shells = {band_colours().index(shell.colour): shell for shell in drawing.surface.shells}
     met = 0
@@ -223,7 +224,7 @@ def test_cancelled_drawing_ends_at_the_next_stage_and_keeps_nothing_of_it(last: 
 
 def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
     design = msgspec.structs.replace(OPTIMAL, node_step=0.25)
-    assert workspace_nodes(design).count > work.MOST_LIVE_NODES
+    assert node_count_of(Workspace(design)).count > work.MOST_LIVE_NODES
     drawing = work.draw_workspace(accessible_request(design))
     assert drawing.trouble is None
     assert drawing.part is not None

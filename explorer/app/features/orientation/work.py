@@ -41,6 +41,7 @@ from explorer.workspace.orientations.tilts import (
 )
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import inclusive_solid, total_solid
+from explorer.workspace.workspace import Workspace
 
 ANGLES = ("azimuth", "tilt", "torsion")
 FULL_TURN = 360.0
@@ -162,7 +163,7 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     """Return the greatest tilts over the workspace of tilt zero; `channel` sends progress."""
     (design, torsion, tool), watch = request, watch_of(channel)
     rotation = rotation_from_tilt_torsion((0.0, 0.0, torsion))
-    ends = extent_of(design, rotation)
+    ends = extent_of(Workspace(design, rotation))
     if ends is None:
         return TiltsDrawing(np.zeros((0, 3)), np.zeros(0), 0.0)
     lows, highs = np.array(ends) + tool_offset(rotation, tool)

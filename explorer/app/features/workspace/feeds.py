@@ -18,6 +18,7 @@ from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import NO_LOAD
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import triple
 from explorer.workspace.position_bands import LOAD_MEASURES, is_unstated
@@ -136,7 +137,7 @@ def workspace_request(frame: Frame) -> work.WorkspaceRequest | None:
         hull=view.hull,
         # The length changes no drawing that is not coloured by it.
         warn_below=frame.state.warn_below if coloured else 1.0,
-        load=frame.state.load if is_loaded else None,
+        load=frame.state.load if is_loaded else NO_LOAD,
     )
 
 
@@ -165,7 +166,7 @@ def send_workspace(
     if at_home:
         region, rows = "limits", work.rows_of(state.design.home_pose.rotation)
     start = workspace_start(frame) if region == "accessible" else None
-    design, load = state.design, None
+    design, load = state.design, NO_LOAD
     if region == "held":
         design, load = loaded_design(state), state.load
     offset = triple(state.offset(rows)) if state.view.at == "tool" else None
