@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 from desk import Desk, by_name, thick, viewed
-from part_gaps import least_gap
+from part_gaps import least_gap, vertices_at
 from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
@@ -126,7 +126,7 @@ def test_parts_are_drawn_where_the_library_places_them(
     placed = placed_with_parts(services, state)
     nodes = by_name(PrototypeScene(services).updates(placed))
     assert len(nodes) == PARTS
-    whole = parts.prototype.at(state.pose.position, state.pose.rotation)
+    whole = vertices_at(parts.prototype, state.pose.position, state.pose.rotation)
     for part, (_, faces), corners in zip(parts.prototype.parts, parts.meshes, whole, strict=True):
         path = next(path for path in nodes if path.endswith(f"/{part.name}"))
         seen = in_scene(nodes, path)[faces]
