@@ -119,7 +119,7 @@ def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
             assert found == [weight, force, limit, 100.0 * float(shares[index])]
             assert f" {k + 2}" in parts[place + k].text
     worst = worst_payload_force(ReportData(design))
-    assert worst.share == pytest.approx(float(shares.max()), rel=1e-9)
+    assert worst.utilisation == pytest.approx(float(shares.max()), rel=1e-9)
 
 
 def test_report_of_a_pose_tells_at_home_what_home_has() -> None:
