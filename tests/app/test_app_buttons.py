@@ -43,7 +43,7 @@ from explorer.page.browser.viser_gaps import PLACE
 from explorer.page.widgets import assigning
 from explorer.page.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 
-pytestmark = pytest.mark.usefixtures("idle_workers")
+pytestmark = pytest.mark.usefixtures("idle_jobs")
 
 FILLED = "is-main"
 ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=10_000)

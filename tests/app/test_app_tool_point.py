@@ -18,7 +18,7 @@ import viser
 from desk import Desk, ScriptedBrowser, by_name, number, rows_of
 from hypothesis import given, strategies as st
 from page_widgets import widgets
-from services import StubDownloads, StubWorker
+from services import StubDownloads, StubJobs
 from strategies import Case, all_cases
 from workspace_feeds import draw
 
@@ -567,8 +567,8 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
         state = Set("compared.look", Look(overlay=True)).apply(Pin(other).apply(state_at(at)))
         for feed in FEEDS:
             services.get(feed).follow(Frame(state))
-        assert isinstance(services.worker, StubWorker)
-        services.worker.work()
+        assert isinstance(services.jobs, StubJobs)
+        services.jobs.work()
         placed = Placed(Frame(state))
         scenes = [services.get(part) for part in SCENES]
         nodes = by_name(update for scene in scenes for update in scene.updates(placed))

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from hypothesis import given
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.mechanism.modes import modes_table, present_mode
@@ -195,8 +195,8 @@ def test_modes_that_meet_in_a_pose_differ_in_the_signs_that_vanish(case: Case) -
 def test_distances_of_deeper_strata_are_shown_at_a_singular_pose_without_the_diagram() -> None:
     singular = GoToSingularity(2).apply(open_state(OPTIMAL))
     frame = Frame(Set("view.singular.strata", value=False).apply(singular))
-    worker = StubWorker(at_once=True)
-    feed = STRATA_FEED(services_for(worker=worker))
+    jobs = StubJobs(at_once=True)
+    feed = STRATA_FEED(services_for(jobs=jobs))
     feed.follow(frame)
     distances = distances_of(frame, feed)
     assert set(COVERED[OF_INCIDENCES[1]]) <= set(distances)

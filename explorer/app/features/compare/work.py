@@ -6,7 +6,6 @@ requested while there is nothing to compare.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, TypeAlias
@@ -17,7 +16,7 @@ from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, kept_workspace, rows_of
 from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
-from explorer.app.session.feed import Feed
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
 from explorer.app.state.state import State
@@ -33,7 +32,7 @@ from explorer.workspace.solids.solids import whole_solid
 
 if TYPE_CHECKING:
     # The process of the worker needs no viser.
-    from explorer.app.features.feature import Services
+    pass
 
 LIVE, NAMES = 0, ("live", *SLOTS)
 """The column of the live design, and the short names of all columns."""
@@ -113,17 +112,6 @@ _kept_case = lru_cache(maxsize=CACHED)(Case)
 CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]
 
 
-def _feed_of(column: int, services: Services) -> CompareFeed:
-    request, redraw = partial(_compared_request, column), services.session.redraw
-    return Feed(services.worker, draw_compared, request, redraw, key=("compared", column))
-
-
-FEEDS: tuple[Callable[[Services], CompareFeed], ...] = tuple(
-    partial(_feed_of, column) for column in range(len(NAMES))
-)
-"""The feeds by column: the live design, then the pinned ones."""
-
-
 def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
     state, compared = frame.state, Compared.of(frame.state)
     design = design_in(column, state)
@@ -138,6 +126,13 @@ def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
     is_turned = column == LIVE and compared.look.at_pose
     rotation = rows_of(frame.snapshot.rotation) if is_turned else None
     return ComparedRequest(without_name(design), drawn=True, rotation=rotation, tolerance=tolerance)
+
+
+FEEDS = tuple(
+    FeedOf(draw_compared, partial(_compared_request, column), key=("compared", column))
+    for column in range(len(NAMES))
+)
+"""The feeds by column: the live design, then the pinned ones."""
 
 
 def design_in(column: int, state: State) -> Design | None:

@@ -12,13 +12,13 @@ import numpy as np
 from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
+from explorer.jobs.process import Channel
 from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import Design
 from explorer.numerics import checks
 from explorer.numerics.number_text import Unit
 from explorer.optimise import conflicts, defaults, problem as problems, solver
 from explorer.optimise.outcome import Outcome
-from explorer.page.session.worker import Channel
 from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.workspace import Workspace
 

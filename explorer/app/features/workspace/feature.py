@@ -331,5 +331,4 @@ WORKSPACE = Feature(
     ),
     scene=(WorkspaceScene,),
     feeds=(feeds.VOLUME_FEED, feeds.WORKSPACE_FEED),
-    tasks=(work.measure_volume, work.draw_workspace),
 )

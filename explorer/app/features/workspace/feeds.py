@@ -13,7 +13,7 @@ import numpy as np
 
 from explorer.app.features.workspace import work
 from explorer.app.scene.surfaces import Measure
-from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -94,7 +94,7 @@ def volume_request(frame: Frame) -> work.Selection:
     return work.Selection(frame.state.design, workspace_rows(frame))
 
 
-VOLUME_FEED = feed_of(work.measure_volume, volume_request)
+VOLUME_FEED = FeedOf(work.measure_volume, volume_request)
 """The feed of the volume within the limits, whether or not the solid is drawn.
 
 It takes a tenth of the time of a drawing, and is followed before `WORKSPACE_FEED`, so that it
@@ -141,7 +141,7 @@ def workspace_request(frame: Frame) -> work.WorkspaceRequest | None:
     )
 
 
-WORKSPACE_FEED = feed_of(work.draw_workspace, workspace_request, has_stages=True)
+WORKSPACE_FEED = FeedOf(work.draw_workspace, workspace_request, has_stages=True)
 """The feed of the drawn workspace, whose surface arrives before the numbers."""
 
 

@@ -15,13 +15,13 @@ from explorer.app.features.workspace import slice_map as maps
 from explorer.app.scene.surfaces import PLAIN, Colouring, Measure, Shell, creased_faces
 from explorer.app.session.feed import watch_of
 from explorer.errors import ExplorerError, InputError
+from explorer.jobs.process import Channel
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import NO_LOAD, Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_apart, format_number
 from explorer.numerics.search import Watch, ignore_stage
-from explorer.page.session.worker import Channel
 from explorer.statics.reactions import has_limits
 from explorer.workspace.accessible.nodes import StartError
 from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
