@@ -7,7 +7,7 @@ import os
 import time
 
 from explorer.errors import InputError
-from explorer.jobs.process import Channel
+from explorer.page.session.worker import Channel
 
 # Seconds between two values.
 PAUSE = 0.002

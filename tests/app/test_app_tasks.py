@@ -1,4 +1,4 @@
-"""Tasks of a process that send messages, are cancelled, fail or die with their process."""
+"""Tasks of the worker that send messages, are cancelled, fail or die with their process."""
 
 from __future__ import annotations
 
@@ -17,9 +17,7 @@ import pytest
 from client import wait_for
 
 from explorer.app.server import ALLOCATOR, LOG, start_log
-from explorer.jobs.executor import DIED_TWICE, RESTARTED, LongJob, log_error
-from explorer.jobs.jobs import Jobs
-from explorer.jobs.process import CANCELLED
+from explorer.page.session.worker import CANCELLED, DIED_TWICE, RESTARTED, Worker, log_error
 from tests.app import telling
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,28 +27,27 @@ NEVER, AT_ONCE = 3600.0, 0.001
 
 
 class Requester:
-    """Requests tasks of a process, and keeps their messages and how they ended, in order."""
+    """Requests tasks of a worker, and keeps their messages and how they ended, in order."""
 
-    job: LongJob
-
-    def __init__(self, jobs: Jobs) -> None:
-        self._jobs = jobs
+    def __init__(self, worker: Worker) -> None:
+        self._worker = worker
         self._events: Queue[tuple[str, Any]] = Queue()
+        self.number = -1
 
     def request(
         self,
         task: str,
         *arguments: Any,
-        key: str | None = "task",
+        key: str = "task",
         sends: bool = True,
     ) -> None:
-        self.job = self._jobs.start(
+        self.number = self._worker.submit(
+            key,
             getattr(telling, task),
             arguments,
             lambda value: self._events.put(("done", value)),
             lambda problem: self._events.put(("failed", problem)),
-            (lambda value: self._events.put(("message", value))) if sends else None,
-            key=key,
+            receive=(lambda value: self._events.put(("message", value))) if sends else None,
         )
 
     def next(self) -> tuple[str, Any]:
@@ -64,34 +61,34 @@ class Requester:
         return messages, event
 
     def assert_works(self) -> None:
-        """Check that the process does what comes next."""
+        """Check that the worker does what comes next."""
         self.request("say", "again", sends=False)
         assert self.next() == ("done", "again")
 
 
 @pytest.fixture(scope="module")
-def shared() -> Iterator[tuple[Jobs, list[str]]]:
+def shared() -> Iterator[tuple[Worker, list[str]]]:
     reports: list[str] = []
-    jobs = Jobs(reports.append)
-    yield jobs, reports
-    jobs.stop()
+    worker = Worker(reports.append)
+    yield worker, reports
+    worker.stop()
 
 
 @pytest.fixture
-def jobs(shared: tuple[Jobs, list[str]]) -> Jobs:
+def worker(shared: tuple[Worker, list[str]]) -> Worker:
     return shared[0]
 
 
 @pytest.fixture
-def reports(shared: tuple[Jobs, list[str]]) -> list[str]:
+def reports(shared: tuple[Worker, list[str]]) -> list[str]:
     """Return the reports of the worker, without those of tests before."""
     shared[1].clear()
     return shared[1]
 
 
 @pytest.fixture
-def requester(jobs: Jobs) -> Requester:
-    return Requester(jobs)
+def requester(worker: Worker) -> Requester:
+    return Requester(worker)
 
 
 def test_task_sends_all_messages_in_order_and_before_its_result(requester: Requester) -> None:
@@ -100,90 +97,93 @@ def test_task_sends_all_messages_in_order_and_before_its_result(requester: Reque
 
 
 def test_task_sends_messages_while_it_runs_and_ends_when_it_is_cancelled(
-    requester: Requester, jobs: Jobs, reports: list[str]
+    requester: Requester, worker: Worker, reports: list[str]
 ) -> None:
     requester.request("count_until_cancelled")
     # The task ends for no other reason, so this came before its end.
     assert requester.next() == ("message", 0)
-    process = jobs.process_id()
-    requester.job.cancel(NEVER)
+    process = worker.process_id
+    worker.cancel(requester.number, NEVER)
     messages, end = requester.all()
     assert end == ("done", len(messages) + 1)
     requester.assert_works()
-    assert jobs.process_id() == process
+    assert worker.process_id == process
+    # One that is cancelled before it was begun ends at once.
+    requester.request("count_until_cancelled")
+    worker.cancel(requester.number, NEVER)
+    messages, end = requester.all()
+    assert end == ("done", len(messages))
     # One that ends by an exception says so.
     requester.request("end_when_cancelled")
     assert requester.next() == ("message", 0)
-    requester.job.cancel(NEVER)
+    worker.cancel(requester.number, NEVER)
     assert requester.all()[1] == ("failed", CANCELLED)
     assert not reports
 
 
 def test_next_task_is_neither_cancelled_nor_killed_with_the_last(
-    requester: Requester, jobs: Jobs
+    requester: Requester, worker: Worker
 ) -> None:
     requester.request("count_until_cancelled")
-    requester.job.cancel(NEVER)
-    first = requester.job
+    worker.cancel(requester.number, NEVER)
+    first = requester.number
     requester.all()
-    process = jobs.process_id()
+    process = worker.process_id
     requester.request("count_until_cancelled")
     # The deadline of the first one passes now.
-    first.cancel(AT_ONCE)
+    worker.cancel(first, AT_ONCE)
     for number in range(100):
         assert requester.next() == ("message", number)
-    requester.job.cancel(NEVER)
+    worker.cancel(requester.number, NEVER)
     assert requester.all()[1][0] == "done"
-    assert jobs.process_id() == process
+    assert worker.process_id == process
 
 
 def test_task_that_does_not_end_when_cancelled_is_killed_without_a_report(
-    requester: Requester, jobs: Jobs, reports: list[str]
+    requester: Requester, worker: Worker, reports: list[str]
 ) -> None:
     requester.request("hang")
     assert requester.next() == ("message", 0)
-    process = jobs.process_id()
-    requester.job.cancel(AT_ONCE)
-    assert requester.next() == ("failed", CANCELLED)
+    process = worker.process_id
+    worker.cancel(requester.number, AT_ONCE)
+    assert requester.next() == ("failed", DIED_TWICE)
     assert not reports
     requester.assert_works()
-    assert jobs.process_id() != process
+    assert worker.process_id != process
 
 
 def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
-    jobs: Jobs, reports: list[str]
+    worker: Worker, reports: list[str]
 ) -> None:
-    first, second, third, fourth = (Requester(jobs) for _ in range(4))
+    first, second, third = (Requester(worker) for _ in range(3))
     first.request("count_until_cancelled")
     assert first.next() == ("message", 0)
-    process = jobs.process_id()
+    process = worker.process_id
     # Both wait for their turn.
     second.request("say", "still wanted", key="second", sends=False)
     third.request("say", "nobody asks any more", key="third", sends=False)
-    fourth.request("count_until_cancelled", key="fourth")
-    for each in (third, fourth, first):
-        each.job.cancel(NEVER)
+    worker.cancel(third.number, NEVER)
+    worker.cancel(first.number, NEVER)
     assert second.next() == ("done", "still wanted")
-    assert fourth.next() == ("failed", CANCELLED)
-    assert third.next() == ("failed", CANCELLED)
-    assert jobs.process_id() == process
+    assert third.next() == ("failed", DIED_TWICE)
+    assert worker.process_id == process
     assert not reports
 
 
 def test_task_that_is_cancelled_after_some_time_makes_room_for_the_next(
-    requester: Requester, jobs: Jobs, reports: list[str]
+    requester: Requester, worker: Worker, reports: list[str]
 ) -> None:
     requester.request("count_until_cancelled")
     assert requester.next() == ("message", 0)
-    process = jobs.process_id()
-    first = requester.job
+    process = worker.process_id
+    first = requester.number
     requester.request("count", 3)
-    first.cancel(after=0.05)
+    worker.cancel(first, after=0.05)
     messages, end = requester.all()
     # The first one ends for no other reason.
     assert end == ("done", len(messages) + 1)
     assert requester.all() == ([0, 1, 2], ("done", 3))
-    assert jobs.process_id() == process
+    assert worker.process_id == process
     assert not reports
 
 
@@ -209,42 +209,39 @@ def test_task_that_refuses_or_kills_its_process_is_reported(
     assert reports == expected
 
 
-def test_request_of_a_key_replaces_the_one_that_waits(requester: Requester, jobs: Jobs) -> None:
+def test_request_of_a_key_replaces_the_one_that_waits(requester: Requester, worker: Worker) -> None:
     requester.request("say", "first", sends=False)
     assert requester.next() == ("done", "first")
-    process = jobs.process_id()
+    process = worker.process_id
     assert process not in (None, os.getpid())
     assert process is not None
     # Stopped, so that it is at the first of them while the others are posted.
     os.kill(process, signal.SIGSTOP)
     for number in range(40):
         requester.request("say", str(number), sends=False)
-    # What has no key is replaced by none.
-    for text in ("one", "another"):
-        requester.request("say", text, key=None, sends=False)
     os.kill(process, signal.SIGCONT)
-    assert jobs.wait_until_idle(PATIENCE)
+    assert worker.wait_until_idle(PATIENCE)
     requester.request("say", "end", sends=False)
     results: list[str] = []
     while (result := requester.next()[1]) != "end":
         results.append(result)
-    assert results[-3:] == ["39", "one", "another"]
-    assert len(results) <= 4
+    assert len(results) <= 2
+    assert results[-1] == "39"
 
 
 def test_killed_worker_is_reported_and_started_again(
-    requester: Requester, jobs: Jobs, reports: list[str]
+    requester: Requester, worker: Worker, reports: list[str]
 ) -> None:
     requester.request("say", "first", sends=False)
     assert requester.next() == ("done", "first")
-    first = jobs.process_id()
+    first = worker.process_id
     assert first is not None
     # Stopped, so that the kill hits it in the middle of its work, which is done all the same.
     os.kill(first, signal.SIGSTOP)
     requester.request("say", "again", sends=False)
     os.kill(first, signal.SIGKILL)
     assert requester.next() == ("done", "again")
-    second = jobs.process_id()
+    second = worker.process_id
     assert second not in (None, first)
     assert second is not None
     # And once more, while it has nothing to do.
@@ -252,19 +249,19 @@ def test_killed_worker_is_reported_and_started_again(
     requester.request("say", "once more", sends=False)
     assert requester.next() == ("done", "once more")
     assert reports == [RESTARTED] * 2
-    assert jobs.process_id() not in (None, first, second)
+    assert worker.process_id not in (None, first, second)
 
 
 def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
     reports: list[str] = []
-    jobs = Jobs(reports.append)
-    requester = Requester(jobs)
+    worker = Worker(reports.append)
+    requester = Requester(worker)
     requester.request("hang")
     assert requester.next() == ("message", 0)
-    process = jobs.process_id()
+    process = worker.process_id
     assert process is not None
     os.kill(process, signal.SIGSTOP)
-    jobs.stop()
+    worker.stop()
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
     assert not reports
@@ -273,15 +270,15 @@ def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
 def test_worker_process_ends_when_its_parent_is_gone() -> None:
     code = """
 import os, sys
-from explorer.jobs.jobs import Jobs
+from explorer.page.session.worker import Worker
 from tests.app import telling
-jobs = Jobs(print)
+worker = Worker(print)
 def receive(value):
     if value == 5:
-        print(jobs.process_id(), flush=True)
+        print(worker.process_id, flush=True)
         os._exit(0)
-jobs.start(telling.count_until_cancelled, (), print, print, receive)
-jobs.wait_until_idle(600.0)
+worker.submit("task", telling.count_until_cancelled, (), print, print, receive=receive)
+worker.wait_until_idle(600.0)
 """
     done = subprocess.run(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=ROOT, check=True
@@ -340,13 +337,12 @@ def test_error_of_a_task_is_logged_and_reported_unless_it_is_a_refusal(
 ) -> None:
     messages, failed = list[str](), Queue[str]()
     receive = None if task == "fall" else Queue[object]().put
-    jobs = Jobs(messages.append)
+    worker = Worker(messages.append, died="it died")
     try:
-        call = getattr(telling, task)
-        jobs.start(call, arguments, failed.put, failed.put, receive, died="it died")
+        worker.submit(task, getattr(telling, task), arguments, failed.put, failed.put, receive)
         assert failed.get(timeout=PATIENCE) == problem
     finally:
-        jobs.stop()
+        worker.stop()
     assert len(messages) == len(reports)
     assert all(report in each for report, each in zip(reports, messages, strict=True))
     assert log.exists() == bool(logged)

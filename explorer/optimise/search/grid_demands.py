@@ -132,7 +132,8 @@ class ClearanceDemand(Demand):
     def find_unproven(self, state: State) -> list[Proof]:
         """Return the pairs that are, or may be, too near in the workspace, and look there too."""
         least = least_clearances(
-            state.workspace,
+            state.design,
+            state.rotation,
             BETWEEN * self.clearance,
             below=self.clearance,
             margin=state.problem.demands.clearance_margin,

@@ -1,1 +1,1 @@
-"""The clock of the page, and the queue of its changes."""
+"""Clocks, queues and the process that computes for the page."""

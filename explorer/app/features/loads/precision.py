@@ -10,7 +10,7 @@ from explorer.app.features.loads import budget as tasks
 from explorer.app.features.loads.load import Loads
 from explorer.app.features.optimise.work import requested_box
 from explorer.app.inputs.controls import At, Controls
-from explorer.app.session.feed import FeedOf
+from explorer.app.session.feed import feed_of
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
@@ -51,7 +51,7 @@ def budget_request(state: State) -> tasks.BudgetRequest:
     )
 
 
-BUDGET_FEED = FeedOf(
+BUDGET_FEED = feed_of(
     tasks.budget_of,
     lambda frame: budget_request(frame.state) if frame.state.view.precision.budget else None,
 )

@@ -385,10 +385,9 @@ def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[El
 
 
 def _path(look: str, places: FloatArray, colour: str = "") -> Element | None:
-    if not places.size:
-        return None
     style = f"stroke:{colour}" if colour else None
-    return element("path", class_=look or None, style=style, d=path_of(places))
+    data = path_of(places)
+    return element("path", class_=look or None, style=style, d=data) if data else None
 
 
 def _ranges(plotted: PlotRows, name: str) -> list[state.Range]:

@@ -1,1 +1,0 @@
-"""Long work in processes of its own, with progress, that can be cancelled and outlasts deaths."""
