@@ -13,7 +13,8 @@ from html import escape
 from typing import Self
 
 from explorer.app.server import Running, start
-from explorer.app.state.actions import Action, Open, SetPose
+from explorer.app.state.actions import Action, Open
+from explorer.app.state.moves import SetPose
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design

@@ -31,19 +31,10 @@ from explorer.app.features.paths.actions import Go, Play, SetPathTime
 from explorer.app.features.studies.actions import BrushAxes
 from explorer.app.features.studies.state import Brush, Studies
 from explorer.app.session.history import UserAction
-from explorer.app.state.actions import (
-    Action,
-    GoHome,
-    Open,
-    Set,
-    SetAngle,
-    SetJoint,
-    SetMode,
-    SetPosition,
-    SetVariable,
-    UseNearest,
-)
+from explorer.app.state.actions import Action, Open, Set
 from explorer.app.state.folds import SetFold
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import GoHome, SetAngle, SetJoint, SetMode, SetPosition, UseNearest
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView

@@ -29,8 +29,9 @@ from explorer.app.features.workspace.feeds import (
     workspace_request,
 )
 from explorer.app.session.history import UserAction
-from explorer.app.state.actions import Set, SetAngle, SetPosition
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetAngle, SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.widgets.blocks import content_of
 from explorer.measures.blocks import clearances, forces, precision, singularity

@@ -31,7 +31,8 @@ from explorer.app.features.view.feature import FORMS
 from explorer.app.inputs.controls import MAIN
 from explorer.app.server import Running
 from explorer.app.session.session import UNDO, Session
-from explorer.app.state.actions import Open, Set, SetJoint, SetPosition
+from explorer.app.state.actions import Open, Set
+from explorer.app.state.moves import SetJoint, SetPosition
 from explorer.app.widgets.buttons import Buttons, extra_button, press_button
 from explorer.files.extras import EXTRAS, LINUX_ALONE, install_command
 from explorer.files.packaged import SOURCES

@@ -16,8 +16,10 @@ from explorer.app.features.history.feature import OVER, ChangeScene, DesignChang
 from explorer.app.features.workspace.feeds import VOLUME_FEED
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import REDO, UNDO
-from explorer.app.state.actions import Action, Open, Set, SetPosition, SetVariable
+from explorer.app.state.actions import Action, Open, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import SetPosition
 from explorer.app.widgets.buttons import Buttons
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design_file import PRESETS

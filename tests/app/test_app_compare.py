@@ -41,9 +41,9 @@ from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import COMPARED
-from explorer.app.state.actions import Open, Set, SetVariable
+from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import without_name
+from explorer.app.state.geometry import SetVariable, without_name
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.storage.library import Library

@@ -15,8 +15,9 @@ from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns, ro
 from explorer.app.features.feature import Services
 from explorer.app.features.history.feature import HISTORY
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import MarkSaved, Open, Set, SetName, SetVariable
+from explorer.app.state.actions import MarkSaved, Open, Set, SetName
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile, encode_session
 from explorer.app.storage.user_data import UserData

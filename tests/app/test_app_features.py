@@ -36,26 +36,20 @@ from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
 from explorer.app.features.workspace.words import CLAIM
-from explorer.app.inputs.controls import At, Bound, Control, Controls
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.bound import Control
+from explorer.app.inputs.controls import Controls
 from explorer.app.page import FEATURES, Page
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.server import Running, start
 from explorer.app.session.feed import Feed
 from explorer.app.session.history import UserAction
 from explorer.app.session.session import UNDO, Session
-from explorer.app.state.actions import (
-    MarkSaved,
-    Set,
-    SetAngle,
-    SetJoint,
-    SetName,
-    SetPose,
-    SetPosition,
-    SetVariable,
-    StartThere,
-)
+from explorer.app.state.actions import MarkSaved, Set, SetName
 from explorer.app.state.folds import SetFold
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import SetAngle, SetJoint, SetPose, SetPosition, StartThere
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.view import OrientationView
 from explorer.app.storage.user_data import open_user_data

@@ -29,9 +29,10 @@ from explorer.app.features.singularity.feature import fold_dial
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Open, Set, SetMode, SetPose
+from explorer.app.state.actions import Open, Set
 from explorer.app.state.folds import SetFold, folds_of
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetMode, SetPose
 from explorer.app.state.state import State, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.errors import InputError

@@ -35,8 +35,9 @@ from explorer.app.features.singularity.work import GoToSingularity, GoToStratum
 from explorer.app.features.view.feature import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import linear_colour, of_one_colour, plate
-from explorer.app.state.actions import GoHome, Open, SetJoint, SetPose
+from explorer.app.state.actions import Open
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import GoHome, SetJoint, SetPose
 from explorer.app.state.state import State, open_state
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA

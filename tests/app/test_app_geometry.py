@@ -20,9 +20,15 @@ from explorer.app.features.optimise.state import Optimisation, OptimisationReque
 from explorer.app.features.optimise.work import PAPER_REQUEST
 from explorer.app.features.paths.state import Paths
 from explorer.app.session.history import start_history
-from explorer.app.state.actions import Open, Reset, Set, SetVariable
+from explorer.app.state.actions import Open, Reset, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import ClearMachine, open_geometry, preset_of, set_unit
+from explorer.app.state.geometry import (
+    ClearMachine,
+    SetVariable,
+    open_geometry,
+    preset_of,
+    set_unit,
+)
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View

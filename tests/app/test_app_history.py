@@ -33,19 +33,10 @@ from explorer.app.session.history import (
     start_history,
 )
 from explorer.app.session.session import REDO, UNDO, move_to
-from explorer.app.state.actions import (
-    Action,
-    GoHome,
-    Open,
-    Reset,
-    Set,
-    SetAngle,
-    SetJoint,
-    SetMode,
-    SetPosition,
-    SetVariable,
-)
+from explorer.app.state.actions import Action, Open, Reset, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import GoHome, SetAngle, SetJoint, SetMode, SetPosition
 from explorer.app.state.state import Hold, State, open_state
 from explorer.errors import ExplorerError, InputError
 from explorer.legs.moves import move_clearance

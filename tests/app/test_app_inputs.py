@@ -17,7 +17,7 @@ from hypothesis import given, strategies as st
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.feature import MachinePanel
 from explorer.app.features.mechanism.feature import DesignPanel, MovePanel
-from explorer.app.inputs.controls import in_unit, item
+from explorer.app.inputs.bindings import in_unit, item
 from explorer.app.inputs.limits import limit_span, push_other_end
 from explorer.app.inputs.ranges import (
     Span,
@@ -31,8 +31,9 @@ from explorer.app.inputs.ranges import (
     variable_span,
 )
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Set, SetJoint, SetPosition
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetJoint, SetPosition
 from explorer.app.state.state import open_state
 from explorer.errors import DesignError
 from explorer.measures.field_words import FIELD_WORDS, message_of

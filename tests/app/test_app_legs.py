@@ -40,8 +40,9 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import SWEPT
 from explorer.app.scene.surfaces import COLLIDING, PLAIN
 from explorer.app.session.history import UserAction
-from explorer.app.state.actions import Set, SetPose, SetPosition
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetPose, SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.widgets.blocks import render
 from explorer.errors import InputError

@@ -18,7 +18,7 @@ from explorer.app.features.designs.feature import UNSAVED
 from explorer.app.features.sharing.feature import send_picture
 from explorer.app.server import Running, start
 from explorer.app.session.session import move_to
-from explorer.app.state.actions import SetPosition
+from explorer.app.state.moves import SetPosition
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData

@@ -71,18 +71,10 @@ from explorer.app.features.optimise.work import (
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.server import start as start_page
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import (
-    Action,
-    Open,
-    Reset,
-    Set,
-    SetAngle,
-    SetJoint,
-    SetPosition,
-    SetVariable,
-)
+from explorer.app.state.actions import Action, Open, Reset, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import set_unit
+from explorer.app.state.geometry import SetVariable, set_unit
+from explorer.app.state.moves import SetAngle, SetJoint, SetPosition
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View

@@ -25,8 +25,9 @@ from explorer.app.features.orientation.feature import (
 from explorer.app.features.workspace.feeds import workspace_request
 from explorer.app.features.workspace.slice_map import AXES
 from explorer.app.features.workspace.work import draw_workspace
-from explorer.app.state.actions import Set, SetAngle, SetPosition
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetAngle, SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import WorkspaceView
 from explorer.errors import InputError

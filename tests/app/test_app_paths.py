@@ -56,8 +56,10 @@ from explorer.app.features.paths.plots import (
 from explorer.app.features.paths.state import STRAIGHT_SECONDS, End, Journey, Paths, journey_of
 from explorer.app.features.paths.work import DrivesRequest, draw_drives, request_for
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import Action, Set, SetPose, SetPosition, SetVariable
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import SetPose, SetPosition
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.errors import InputError

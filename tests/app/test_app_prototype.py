@@ -40,8 +40,10 @@ from explorer.app.features.prototype.work import (
 )
 from explorer.app.features.sharing.feature import ExportDialog
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import Open, Set, SetPose, SetPosition, SetVariable
+from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import SetPose, SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.markup import status

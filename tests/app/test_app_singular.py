@@ -42,8 +42,9 @@ from explorer.app.features.singularity.scene import (
 )
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Set, SetMode, SetPosition
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetMode, SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import SingularView
 from explorer.app.widgets.blocks import render

@@ -16,20 +16,10 @@ from sample_states import Sample, samples, states_of
 from strategies import designs
 
 from explorer.app.session.session import Session
-from explorer.app.state.actions import (
-    Action,
-    GoHome,
-    Open,
-    Reset,
-    Set,
-    SetAngle,
-    SetJoint,
-    SetMode,
-    SetPosition,
-    SetVariable,
-    UseNearest,
-)
+from explorer.app.state.actions import Action, Open, Reset, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import GoHome, SetAngle, SetJoint, SetMode, SetPosition, UseNearest
 from explorer.app.state.state import State, joints_of, mode_at, open_state
 from explorer.errors import DesignError, InputError
 from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Design

@@ -21,7 +21,8 @@ from explorer.app.features.optimise.state import Optimisation, SearchRun
 from explorer.app.features.paths.state import Paths
 from explorer.app.session.history import History, Step, start_history
 from explorer.app.session.session import REDO, UNDO, Session
-from explorer.app.state.actions import SetName, SetPosition
+from explorer.app.state.actions import SetName
+from explorer.app.state.moves import SetPosition
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.storage import user_data

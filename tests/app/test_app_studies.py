@@ -59,8 +59,9 @@ from explorer.app.features.studies.state import (
 from explorer.app.features.studies.words import status
 from explorer.app.features.studies.work import StudyRunner
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Set, SetVariable
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import open_state
 from explorer.app.widgets.buttons import Buttons

@@ -59,8 +59,9 @@ from explorer.app.inputs.ranges import position_span
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Set, SetAngle, SetMode, SetPose, SetPosition
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetAngle, SetMode, SetPose, SetPosition
 from explorer.app.state.state import State, angles_of, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.mechanism.configuration import Point

@@ -17,8 +17,10 @@ from explorer.app.features.help.tour import OVER, STAYS, STEPS, EndTour, Tour, T
 from explorer.app.features.optimise.actions import Accept, EndRun, StartRun
 from explorer.app.features.optimise.state import Optimisation, SearchResult
 from explorer.app.features.paths.state import Paths
-from explorer.app.state.actions import Action, Set, SetPosition, SetVariable
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS

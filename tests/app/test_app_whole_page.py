@@ -21,7 +21,8 @@ from explorer.app.features.optimise.actions import Accept, SetRequest, StartRun
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest
 from explorer.app.features.paths.state import Paths
 from explorer.app.server import Running
-from explorer.app.state.actions import Action, GoHome, Open, Set, SetAngle, SetPose, SetPosition
+from explorer.app.state.actions import Action, Open, Set
+from explorer.app.state.moves import GoHome, SetAngle, SetPose, SetPosition
 from explorer.app.state.state import State
 from explorer.app.state.view import View
 from explorer.errors import ExplorerError

@@ -28,8 +28,10 @@ from explorer.app.features.workspace.slice_map import map_picture
 from explorer.app.features.workspace.words import drawing_words, volume_headline, volume_text
 from explorer.app.features.workspace.work import STEP, Selection, WorkspaceDrawing, export_mesh
 from explorer.app.scene.surfaces import AT_LIMIT, PLAIN
-from explorer.app.state.actions import Open, Set, SetPosition, SetVariable
+from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView
 from explorer.errors import InputError

@@ -22,8 +22,9 @@ from explorer.app.features.workspace.words import drawing_words
 from explorer.app.scene.surfaces import MOST_COLOURED, Colouring, Shell, creased_faces
 from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
-from explorer.app.state.actions import Set, SetVariable
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import WorkspaceView
 from explorer.mechanism.design import Design

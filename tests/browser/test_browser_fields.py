@@ -9,7 +9,8 @@ import pytest
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.state.actions import Set, SetPosition
+from explorer.app.state.actions import Set
+from explorer.app.state.moves import SetPosition
 
 
 def words_of_steps(tab: Tab) -> list[str]:

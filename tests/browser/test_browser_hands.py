@@ -17,7 +17,7 @@ from explorer.app.layout import DRAWER_HEIGHT, NARROW
 from explorer.app.scene.camera import framing
 from explorer.app.screenshot import SCENE_CANVAS
 from explorer.app.server import start
-from explorer.app.state.actions import SetPosition
+from explorer.app.state.moves import SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.mechanism.design_file import PRESETS
 

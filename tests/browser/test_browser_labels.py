@@ -18,8 +18,9 @@ from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.scene.camera import VIEWS, ViewName, framing
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
-from explorer.app.state.actions import Open, Set, SetAngle, SetPose, SetPosition
+from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetAngle, SetPose, SetPosition
 from explorer.app.state.view import PrototypeView, View
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray

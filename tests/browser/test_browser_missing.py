@@ -15,7 +15,8 @@ from tab import Tab, middle
 
 from explorer import PRESETS
 from explorer.app.server import Running
-from explorer.app.state.actions import Open, SetPosition
+from explorer.app.state.actions import Open
+from explorer.app.state.moves import SetPosition
 from explorer.page.browser.headless import CHROMIUM_FLAGS, find_chromium
 
 # Lets time pass by a pause after which the page looks whether it was answered.

@@ -12,8 +12,9 @@ from explorer.app.features.mechanism.folds import fold_arcs, leaf_corners
 from explorer.app.features.mechanism.incidences import EDGES, INSET
 from explorer.app.features.view.feature import ground_of, shadow_outlines
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import Set, SetPose
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetPose
 from explorer.app.state.state import open_state
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA

@@ -15,8 +15,8 @@ from explorer.app.features.mechanism.feature import JOINT_LABELS
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.features.mechanism.modes import mode_hover
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetPosition
 from explorer.app.state.state import State, joints_of
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.kinematics import forward

@@ -25,7 +25,8 @@ from explorer.app.screenshot import (
     take,
 )
 from explorer.app.server import Running, start
-from explorer.app.state.actions import Set, SetPosition
+from explorer.app.state.actions import Set
+from explorer.app.state.moves import SetPosition
 from explorer.app.state.view import View
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.page.widgets.assigning import Update

@@ -8,8 +8,8 @@ from tab import TRACK, Tab
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import PAUSE_SECONDS
-from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetPosition
 
 # Longer than the pause after which an event begins a step of its own, where no press is known.
 REST_SECONDS = PAUSE_SECONDS + 0.3

@@ -12,7 +12,8 @@ from playwright.sync_api import Locator, expect
 from tab import Tab
 
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
-from explorer.app.state.actions import Action, Open, Set, SetAngle
+from explorer.app.state.actions import Action, Open, Set
+from explorer.app.state.moves import SetAngle
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Tool

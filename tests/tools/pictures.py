@@ -37,15 +37,9 @@ from explorer.app.features.studies.state import Brush, within
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import draw_page, open_page, settle, stable_picture
 from explorer.app.server import Running, start
-from explorer.app.state.actions import (
-    Action,
-    Open,
-    Set,
-    SetJoint,
-    SetPose,
-    SetPosition,
-    SetVariable,
-)
+from explorer.app.state.actions import Action, Open, Set
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import SetJoint, SetPose, SetPosition
 from explorer.app.state.view import (
     ForcesView,
     OrientationView,

@@ -1,41 +1,30 @@
-"""The controls of a panel, each bound to the state, which they show and set.
-
-A binding says where a control's value is read, and what sets it. A control posts only that it was
-changed; its value is read when the session handles the change. A value is assigned to a control
-only if it differs from the one that the user just set, so that a slider never moves under the
-pointer.
-"""
+"""The controls of a panel, each bound to the state, which they show and set."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Any, Generic, Literal, Protocol, TypeAlias, TypedDict, TypeVar, Unpack, cast
+from typing import Any, Literal, Protocol, Unpack
 
 import viser
 
-from explorer.app.inputs.ranges import (
-    Intervals,
-    Span,
-    Track,
-    decimals,
-    in_whole_steps,
-    tint_marks,
-    unit_step,
+from explorer.app.inputs.bindings import (
+    Bound,
+    Source,
+    Value,
+    bound_to,
+    in_unit,
+    span_in_unit,
+    step_in_unit,
 )
+from explorer.app.inputs.bound import Conditions, Control, Slider
+from explorer.app.inputs.ranges import Intervals, Span, Track
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action, Set, value_text
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
-from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
-from explorer.app.widgets.markup import colour_strip
-from explorer.errors import InputError
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
-from explorer.numerics.number_text import snap_to_decimals
-from explorer.page.browser.viser_gaps import MARKS, slider_marks
 from explorer.page.widgets.assigning import Update
 from explorer.page.widgets.palette import NO_OPTION, Key, WithCommands
 
@@ -43,236 +32,6 @@ from explorer.page.widgets.palette import NO_OPTION, Key, WithCommands
 MAIN: Literal["blue"] = "blue"
 # Decimals of a field in which values far below its step count.
 MOST_DECIMALS = 9
-
-Value = TypeVar("Value", float, bool, str, Pair, Triple)
-
-
-@dataclass(frozen=True)
-class Bound(Generic[Value]):
-    """The binding of a control: how its value is read in a frame, and written as an action.
-
-    The action is None while the value does not change the state.
-    """
-
-    read: Callable[[Frame], Value]
-    write: Callable[[State, Value], Action | None]
-
-
-def item(
-    values: Callable[[Frame], Sequence[float]], index: int, action: Callable[[int, float], Action]
-) -> Bound[float]:
-    """Return the binding to one of several values, which an action sets by its index."""
-    return Bound(lambda frame: values(frame)[index], lambda _, value: action(index, value))
-
-
-@dataclass(frozen=True)
-class At:
-    """A plain value of the state, shown and set by a control.
-
-    Attributes:
-        path: Path of the value, such as "view.warn_below".
-        default: Function that returns the control's value where the state has None.
-        convert: Function from the control's value to that of the state.
-        action: Class of the action that sets the value.
-    """
-
-    path: str
-    default: Callable[[State], Any] | None = None
-    convert: Callable[[Any], Any] = lambda value: value
-    action: type[Set] = Set
-
-    def bound(self, name: str, options: Mapping[str, object] | None = None) -> Bound[Any]:
-        """Return the binding.
-
-        Args:
-            name: Name of the value in the history, such as the label of its control.
-            options: Values by the words of a list; None if the control holds the value itself.
-        """
-        if options is not None:
-            texts = {value: text for text, value in options.items()}
-            return Bound(
-                lambda frame: texts[self._read(frame)],
-                lambda _, text: self.action(self.path, options[text], name, text),
-            )
-        return Bound(self._read, lambda _, value: self.action(self.path, self.convert(value), name))
-
-    def _read(self, frame: Frame) -> Any:
-        value = value_at(frame.state, self.path)
-        return self.default(frame.state) if value is None and self.default else value
-
-
-Source: TypeAlias = str | At | Bound[Value]
-"""The source of a control's value; a text is the path of a plain value."""
-
-
-def bound_to(
-    at: Source[Value], name: str, options: Mapping[str, object] | None = None
-) -> Bound[Value]:
-    """Return a binding itself, or the binding to the value at a path."""
-    if isinstance(at, Bound):
-        return at
-    return (At(at) if isinstance(at, str) else at).bound(name, options)
-
-
-def in_unit(bound: Bound[Any], power: int) -> Bound[Any]:
-    """Return the binding of a control that shows lengths, or a power of them, in the view's unit.
-
-    Of several values, one that is written back as it was shown keeps its exact value.
-    """
-
-    def read(frame: Frame) -> Any:
-        unit, value = frame.state.unit_of(power), bound.read(frame)
-        values = tuple(map(unit.convert, _parts(value)))
-        return values if isinstance(value, tuple) else values[0]
-
-    def write(state: State, new: Any) -> Action | None:
-        frame, unit = Frame(state), state.unit_of(power)
-        pairs = zip(_parts(new), _parts(bound.read(frame)), _parts(read(frame)), strict=True)
-        values = [old if part == shown else unit.read(part) for part, old, shown in pairs]
-        action = bound.write(state, tuple(values) if isinstance(new, tuple) else values[0])
-        if isinstance(action, Set) and not action.text:
-            text = " to ".join(map(value_text, _parts(new)))
-            return replace(action, text=f"{text} {unit.name}")
-        return action
-
-    return Bound(read, write)
-
-
-def _parts(value: Any) -> tuple[float, ...]:
-    return cast("tuple[float, ...]", value) if isinstance(value, tuple) else (value,)
-
-
-def _span_in_unit(span: Span | Callable[[State], Span], power: int) -> Callable[[State], Span]:
-    def span_of(state: State) -> Span:
-        return in_whole_steps(span if isinstance(span, Span) else span(state), state.unit_of(power))
-
-    return span_of
-
-
-def _step_in_unit(step: float | Callable[[State], float], power: int) -> Callable[[State], float]:
-    return lambda state: unit_step(step(state) if callable(step) else step, state.unit_of(power))
-
-
-Condition = Callable[[State], bool]
-"""A function that tells whether a condition holds in a state."""
-
-
-@dataclass(eq=False)
-class Control(Generic[Value]):
-    """An input of the page, bound to the state.
-
-    Attributes:
-        session: Session to which changes are posted.
-        handle: The input.
-        bound: Binding of its value.
-        disabled: Condition in which it is disabled; None for never.
-        visible: Condition in which it is visible; None for always.
-        step: Function that returns the step of its buttons; None for a fixed one, or none.
-    """
-
-    session: Session
-    handle: viser.GuiInputHandle[Value]
-    bound: Bound[Value]
-    disabled: Condition | None = None
-    visible: Condition | None = None
-    step: Callable[[State], float] | None = None
-    _last_value: Value | None = field(default=None, init=False)
-    # Whether the last value came from the control itself.
-    _is_set_here: bool = field(default=False, init=False)
-
-    def __post_init__(self) -> None:
-        self.handle.on_update(self._post_change)
-
-    # A coroutine runs on the thread that reads messages, so that changes and presses keep their
-    # order.
-    async def _post_change(self, event: viser.GuiEvent[Any]) -> None:
-        # Assignments by the explorer itself have no client.
-        if event.client_id is not None:
-            stamp = self.handle.update_timestamp
-            self.session.post(self, self._change, stamp=stamp, who=event.client_id)
-
-    def use(self, value: Value, client: viser.ClientHandle) -> None:
-        """Set another value, as a command of a client does."""
-        self.session.post(self, lambda state: self.bound.write(state, value), who=client.client_id)
-
-    def _change(self, state: State) -> Action | None:
-        self._last_value = self.handle.value
-        self._is_set_here = True
-        for number in _parts(self._last_value):
-            # No session file could hold it.
-            if isinstance(number, float) and not math.isfinite(number):
-                raise InputError(f"a value must be a finite number; got {number}")
-        return self.bound.write(state, self._last_value)
-
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the control show the frame, its step first."""
-        if self.step is not None:
-            step = self.step(frame.state)
-            yield self.handle, "step", step
-            yield self.handle, "precision", decimals(step)
-        yield from self._show(frame.state, self.bound.read(frame))
-
-    def _show(self, state: State, value: Value) -> Iterator[Update]:
-        if self.disabled is not None:
-            yield self.handle, "disabled", self.disabled(state)
-        if self.visible is not None:
-            yield self.handle, "visible", self.visible(state)
-        # While a newer change waits, its value counts.
-        if value != self._last_value and not self.session.is_waiting(self):
-            self._last_value = value
-            self._is_set_here = False
-            yield self.handle, "value", value
-
-    def _is_own(self, value: Value) -> bool:
-        """Whether a value is the one that was last set with the control itself."""
-        return self._is_set_here and (value == self._last_value or self.session.is_waiting(self))
-
-
-@dataclass(eq=False, kw_only=True)
-class Slider(Control[Any]):
-    """A slider with one thumb or two, whose range and tinted parts follow the state.
-
-    Attributes:
-        track: Its range.
-        tinted: Function that returns the tinted parts of its track; None to tint none.
-        colours: The strip behind its track and the function that returns the stops of the strip's
-            gradient; None for a grey track.
-    """
-
-    track: Track
-    tinted: Callable[[Frame], Intervals] | None = None
-    colours: tuple[viser.GuiHtmlHandle, Callable[[Frame, Span], str]] | None = None
-
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the slider show the frame, its range first."""
-        if self.visible is not None and not self.visible(frame.state):
-            yield self.handle, "visible", False
-            if self.colours is not None:
-                yield self.colours[0], "visible", False
-            return
-        value: float | Pair = self.bound.read(frame)
-        ends = value if isinstance(value, tuple) else (value,)
-        tinted = () if self.tinted is None else self.tinted(frame)
-        span = self.track.span(frame.state, ends, tinted, is_own=self._is_own(value))
-        yield from self.track.updates(span)
-        if self.tinted is not None:
-            yield self.handle, MARKS, slider_marks(tint_marks(tinted, span))
-        if self.colours is not None:
-            strip, stops = self.colours
-            yield strip, "visible", True
-            yield strip, "content", colour_strip(stops(frame, span))
-        if not isinstance(value, tuple):
-            # A field would show rounding as −0.00, or as 5.00 where 5 was meant.
-            size = max(abs(span.low), abs(span.high))
-            value = snap_to_decimals(value, decimals(span.step), size)
-        yield from self._show(frame.state, value)
-
-
-class Conditions(TypedDict, total=False):
-    """In which states a control is disabled, never if missing, and visible, always if missing."""
-
-    disabled: Condition | None
-    visible: Condition | None
 
 
 class WithControls(WithCommands, Protocol):
@@ -338,7 +97,7 @@ class Controls:
         # The stylesheet puts the colours on the track.
         colours = None if coloured is None else (self._gui.add_html(""), coloured)
         if power:
-            span = _span_in_unit(span, power)
+            span = span_in_unit(span, power)
         handle = self._gui.add_slider(label, 0.0, 1.0, 0.01, 0.0, hint=hint, marks=())
         slider = Slider(
             self._session,
@@ -376,7 +135,7 @@ class Controls:
         # The stylesheet puts the fields into the row of the thumbs, and a script names them.
         fields = self._gui.add_vector2(f"{label} ends", (0.0, 1.0), step=0.01, hint=hint)
         untyped: Any = thumbs
-        shown, bound = (_span_in_unit(span, power), in_unit(at, power)) if power else (span, at)
+        shown, bound = (span_in_unit(span, power), in_unit(at, power)) if power else (span, at)
         self._controls.append(
             Slider(self._session, untyped, bound, track=Track(thumbs, shown), **conditions)
         )
@@ -404,7 +163,7 @@ class Controls:
             power: Exponent of length, as in `slider`; least value and step are in design units.
             conditions: In which states it is disabled and visible.
         """
-        follows = _step_in_unit(step, power) if power else step if callable(step) else None
+        follows = step_in_unit(step, power) if power else step if callable(step) else None
         fixed = None if callable(step) else step
         handle = self._gui.add_number(label, least, min=least, step=fixed, hint=hint)
         handle.precision = MOST_DECIMALS
@@ -425,7 +184,7 @@ class Controls:
         handle = self._gui.add_vector3(label, (0.0, 0.0, 0.0), step=step, hint=hint)
         handle.precision = MOST_DECIMALS
         bound = self._bound(handle, at, label, power=power)
-        self._bind(handle, bound, _step_in_unit(step, power) if power else None, **conditions)
+        self._bind(handle, bound, step_in_unit(step, power) if power else None, **conditions)
 
     def checkbox(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from explorer.app.inputs.controls import Bound
+from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.ranges import Span, span_around
 from explorer.app.state.actions import Set
 from explorer.app.state.parts import with_value

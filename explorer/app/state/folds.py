@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from explorer.app.state.actions import FULL_TURN, Action, move_to
+from explorer.app.state.actions import Action
+from explorer.app.state.moves import FULL_TURN, move_to
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import Folds, GivenFolds, State
 from explorer.errors import InputError

@@ -18,11 +18,14 @@ from typing import Any, ClassVar
 import msgspec
 
 from explorer.app.state.actions import Action, Open, Set
+from explorer.app.state.moves import assemble, move_to
 from explorer.app.state.parts import in_unit
 from explorer.app.state.state import State
 from explorer.app.state.view import View
-from explorer.mechanism.design import Design
+from explorer.errors import InputError
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.kinematics import forward
 from explorer.numerics.number_text import format_number
 
 MACHINE = ("tool", "payload", "gravity", "actuators", "struts", "guide", "tolerances")
@@ -72,6 +75,40 @@ def set_unit(state: State, unit_mm: float) -> Set:
     scaled = msgspec.structs.replace(state.design, unit_mm=unit_mm)
     design = with_machine(scaled, state.design, state.view)
     return Set("design", design, "1 unit", f"{format_number(unit_mm, 6)} mm")
+
+
+@dataclass(frozen=True)
+class SetVariable(Action):
+    """Set one design variable, named as in `VARIABLES`; `State.hold` says what stays."""
+
+    name: str
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            DesignError: The design would be degenerate.
+            InputError: The legs are held and cannot close in the new design, or the
+                design is being optimised.
+        """
+        state.check_free()
+        design = state.design.with_variable(self.name, self.value)
+        if state.hold == "pose":
+            return move_to(replace(state, design=design), state.pose, state.yaw_pitch_roll)
+        solution = forward(design, state.joints)
+        if not solution.feasible:
+            present = state.design.variables[VARIABLES.index(self.name)]
+            raise InputError(
+                f"{self.name} = {state.unit.text(self.value, 6)} cannot be assembled while the "
+                f"legs are held; it stays {state.unit.text(present, 6)}. Hold the pose to go "
+                "further."
+            )
+        return assemble(replace(state, design=design), solution, state.mode)
+
+    def describe(self, after: State) -> str:
+        """Return which variable has which value."""
+        return f"{self.name} = {after.unit.text(self.value, 6)}"
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The state of the application, a frozen value from which the page is drawn.
 
 There is one state for the whole server, shared by every tab. It changes only through
-`explorer.app.session.session`, by the actions of `explorer.app.state.actions` and of the features.
+`explorer.app.session.session`, by actions, see `explorer.app.state.actions`.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ from html import escape
 import viser
 
 from explorer.app.features.feature import Export, Feature, Services, Tab
-from explorer.app.inputs.controls import Bound, Controls
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, MarkSaved, Open, SetName
 from explorer.app.state.frame import Frame

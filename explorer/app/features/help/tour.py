@@ -20,8 +20,10 @@ import viser
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import CancelRun, Revert, StartRun, TakePaperProblem
 from explorer.app.features.optimise.state import Optimisation, SearchRun
-from explorer.app.state.actions import Action, GoHome, Set, SetPosition, SetVariable, move_to
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.geometry import SetVariable
+from explorer.app.state.moves import GoHome, SetPosition, move_to
 from explorer.app.state.parts import take_back, with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button

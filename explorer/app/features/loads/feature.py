@@ -16,9 +16,11 @@ from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEll
 from explorer.app.features.loads.scene import ForcesScene, LoadHandle
 from explorer.app.features.machine.actuators import FORCE, FORCES
 from explorer.app.features.machine.feature import MOMENT
-from explorer.app.inputs.controls import Bound, Controls
-from explorer.app.state.actions import Action, Set, SetPose
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetPose
 from explorer.app.state.state import State
 from explorer.app.state.view import Weighed
 from explorer.app.widgets.blocks import render

@@ -9,7 +9,8 @@ from explorer.app.features.feature import Export, Services, html_of, show_html
 from explorer.app.features.loads import budget as tasks
 from explorer.app.features.loads.load import Loads
 from explorer.app.features.optimise.work import requested_box
-from explorer.app.inputs.controls import At, Controls
+from explorer.app.inputs.bindings import At
+from explorer.app.inputs.controls import Controls
 from explorer.app.session.feed import feed_of
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, Set

@@ -14,11 +14,12 @@ import viser
 from explorer.app.features.feature import Feature, Services, Tab, show_html
 from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls, add_actuators
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
-from explorer.app.inputs.controls import At, Bound, item
+from explorer.app.inputs.bindings import At, Bound, item
 from explorer.app.inputs.ranges import Span, platform_span
-from explorer.app.state.actions import FULL_TURN, Action, Set
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import ClearMachine
+from explorer.app.state.moves import FULL_TURN
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.markup import box, note

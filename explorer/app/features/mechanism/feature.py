@@ -24,13 +24,14 @@ from explorer.app.features.mechanism.marks import DragHandle, Labels
 from explorer.app.features.mechanism.modes import MODES, Ghosts, ModesPanel
 from explorer.app.features.mechanism.sketch import sketch
 from explorer.app.inputs import ranges
-from explorer.app.inputs.controls import Bound, Controls, item
+from explorer.app.inputs.bindings import Bound, item
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.limits import bound_entry, bound_switch, limit_span
 from explorer.app.inputs.ranges import Intervals, Span
-from explorer.app.state import actions
-from explorer.app.state.actions import SetMode
+from explorer.app.state import actions, geometry, moves
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import open_geometry, preset_of, set_unit
+from explorer.app.state.moves import SetMode
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import Hold, State
 from explorer.app.state.view import LengthName
@@ -101,7 +102,7 @@ class MovePanel:
                 controls.slider(
                     name,
                     f"The {name} coordinate of b4 or of the tool point in the base frame.",
-                    item(lambda frame: frame.state.position, axis, actions.SetPosition),
+                    item(lambda frame: frame.state.position, axis, moves.SetPosition),
                     partial(ranges.position_span, axis=axis),
                     power=1,
                     visible=_is_by_position,
@@ -110,7 +111,7 @@ class MovePanel:
                 controls.slider(
                     f"{name} (°)",
                     f"Rotation of the platform {order}, in degrees.",
-                    item(lambda frame: frame.state.yaw_pitch_roll, axis, actions.SetAngle),
+                    item(lambda frame: frame.state.yaw_pitch_roll, axis, moves.SetAngle),
                     Span(-edge, edge, 0.1),
                     visible=_is_by_position,
                 )
@@ -118,7 +119,7 @@ class MovePanel:
                 controls.slider(
                     label,
                     hint,
-                    item(lambda frame: frame.state.joints, joint, actions.SetJoint),
+                    item(lambda frame: frame.state.joints, joint, moves.SetJoint),
                     partial(ranges.joint_span, joint=joint),
                     tinted=partial(closing_values, joint=joint),
                     closes_up=True,
@@ -131,7 +132,7 @@ class MovePanel:
                 "Use the nearest length",
                 "Move this leg to the nearest length that closes and stays clear of "
                 "singularities; the other legs stay as they are.",
-                actions.UseNearest,
+                moves.UseNearest,
                 icon=viser.Icon.MAGNET,
                 main=True,
                 keys=(Key("U"),),
@@ -139,7 +140,7 @@ class MovePanel:
             controls.button(
                 "Home pose",
                 "Return to the home pose, with which the design opens.",
-                actions.GoHome,
+                moves.GoHome,
                 icon=viser.Icon.HOME,
                 keys=(Key("H"),),
             )
@@ -248,7 +249,7 @@ class DesignPanel:
                     VARIABLE_HINTS[name],
                     Bound(
                         lambda frame, index=index: frame.state.design.variables[index],
-                        lambda _, value, name=name: actions.SetVariable(name, value),
+                        lambda _, value, name=name: geometry.SetVariable(name, value),
                     ),
                     partial(ranges.variable_span, index=index),
                     power=1,

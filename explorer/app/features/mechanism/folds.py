@@ -16,7 +16,8 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services, show
-from explorer.app.inputs.controls import Controls, item
+from explorer.app.inputs.bindings import item
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span, length_span
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import add_label, add_lines, add_translucent, of_one_colour

@@ -10,7 +10,7 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
-from explorer.app.state.actions import SetPose
+from explorer.app.state.moves import SetPose
 from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.mechanism.pose import Pose

@@ -11,8 +11,8 @@ from explorer.app.features.mechanism import bodies
 from explorer.app.features.mechanism.incidences import HoveredRow
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
 from explorer.app.scene.shapes import GHOST, NO_MESH, add_label, add_lines, add_translucent
-from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetMode
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, turn
 from explorer.app.widgets.markup import box

@@ -1,7 +1,7 @@
 """The actions of an optimisation, from its problem to accepting the result.
 
-During a run the actions of `explorer.app.state.actions` that would change the design are refused,
-so that a slider touched by accident does not end the run.
+During a run all actions that would change the design are refused by
+`State.check_free`, so that a slider touched by accident does not end the run.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import numpy as np
 
 from explorer.app.features.optimise.state import PLACE, Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, problem_of
-from explorer.app.state.actions import Action, Open, Set, move_to
+from explorer.app.state.actions import Action, Open, Set
 from explorer.app.state.geometry import with_machine
+from explorer.app.state.moves import move_to
 from explorer.app.state.parts import parts_kept_on_open, value_at, with_value
 from explorer.app.state.state import State
 from explorer.errors import InputError, NoAnswerError

@@ -21,7 +21,8 @@ from explorer.app.features.optimise.state import PLACE, Optimisation, Optimisati
 from explorer.app.features.optimise.words import goal_unit, result_words, search_notice
 from explorer.app.features.optimise.work import complete_request, requested_box
 from explorer.app.features.prototype.building import BuildVerdict
-from explorer.app.inputs.controls import At, Bound, Controls
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.controls import Controls
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.state.actions import Action

@@ -14,7 +14,8 @@ import viser
 from explorer.app.features.feature import Feature, Services, Tab, html_of, show_html
 from explorer.app.features.orientation import maps, work
 from explorer.app.features.workspace.slice_map import AXES, keeps_above, level_within
-from explorer.app.inputs.controls import Controls, item
+from explorer.app.inputs.bindings import item
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, add_translucent

@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from explorer.app.features.workspace.work import LIVE_TOLERANCE
 from explorer.app.session.feed import Feed, feed_of, watch_of
-from explorer.app.state.actions import Action, move_to
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import move_to
 from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.mechanism.configuration import tool_offset

@@ -10,7 +10,8 @@ import numpy as np
 
 from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.features.paths.state import End, Journey, Paths, journey_of
-from explorer.app.state.actions import Action, Set, move_to
+from explorer.app.state.actions import Action, Set
+from explorer.app.state.moves import move_to
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import Joints, State, joints_of
 from explorer.app.state.view import Weighed

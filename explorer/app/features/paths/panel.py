@@ -12,7 +12,8 @@ from explorer.app.features.feature import Services, show_html
 from explorer.app.features.paths import actions, plots
 from explorer.app.features.paths.drives import DrivesPanel
 from explorer.app.features.paths.state import End, PathKind, Paths, journey_of
-from explorer.app.inputs.controls import Bound, Controls
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame

@@ -12,7 +12,8 @@ from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype import work
 from explorer.app.features.prototype.building import BUILD_FEED, BuildVerdict, strokes_table
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, PartsFeed, parts_to_draw
-from explorer.app.inputs.controls import Bound, Controls
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH

@@ -14,7 +14,8 @@ import viser
 from explorer.app.features.feature import Feature, InBar, Services, StateCommand, Tab, show_html
 from explorer.app.features.mechanism.incidences import HOVER, margin_hover
 from explorer.app.features.singularity import scene, work
-from explorer.app.inputs.controls import At, Controls
+from explorer.app.inputs.bindings import At
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import length_span
 from explorer.app.state.folds import FIRST_FOLD
 from explorer.app.state.frame import Frame

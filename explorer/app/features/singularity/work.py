@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from explorer.app.session.feed import Feed, feed_of
-from explorer.app.state.actions import Action, move_to
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import move_to
 from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration

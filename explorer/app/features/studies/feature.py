@@ -27,7 +27,9 @@ from explorer.app.features.studies.state import (
 )
 from explorer.app.features.studies.words import BUTTONS, acts, chips, head, legend, table
 from explorer.app.features.studies.work import study_runner
-from explorer.app.inputs.controls import At, Bound, Control, Controls
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.bound import Control
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.session.session import Change, Who
 from explorer.app.state.actions import Action, Set

@@ -14,12 +14,14 @@ from explorer.app.features.feature import Export, Feature, InBar, Services, Tab,
 from explorer.app.features.workspace import feeds, words as texts, work
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
-from explorer.app.inputs.controls import At, Bound, Controls
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span, coordinate_span, fine_step, round_up
 from explorer.app.scene.surfaces import Measure
 from explorer.app.session.session import Change
-from explorer.app.state.actions import Action, Set, SetPose, StartThere
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetPose, StartThere
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.buttons import figure
