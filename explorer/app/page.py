@@ -32,6 +32,7 @@ from explorer.app.features.workspace.feature import WORKSPACE
 from explorer.app.layout import TITLE, Bar, Layout, Panels
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
+from explorer.app.session.feed import modules_of
 from explorer.app.session.session import Session, Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -40,13 +41,14 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import sentence
 from explorer.app.widgets.theme import Theme
+from explorer.jobs.executor import log_error
+from explorer.jobs.jobs import PAGE, Jobs
 from explorer.measures.field_words import message_of
 from explorer.numerics.arrays import FloatArray
 from explorer.page.browser.browser_facts import listen
 from explorer.page.browser.viser_gaps import run_script
 from explorer.page.look import read_script, read_stylesheet
 from explorer.page.session import clock
-from explorer.page.session.worker import Worker, log_error
 from explorer.page.state.presses import Presses
 from explorer.page.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.page.widgets.palette import Command, Palette
@@ -56,8 +58,8 @@ FEATURES: tuple[Feature, ...] = (
     DESIGNS, MECHANISM, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, ORIENTATION, LOADS,
     PROTOTYPE, LEGS, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
 )  # fmt: skip
-# Modules that the worker imports at its start.
-TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})
+# Modules that the process of the page imports at its start.
+TASKS = modules_of(feed for each in FEATURES for feed in (*each.feeds, *each.later_feeds))
 # Scripts of the whole page.
 SCRIPTS = (
     # Before all that reads keys.
@@ -138,7 +140,7 @@ class Page:
         # Looks after the cameras once nothing has been drawn for a while, or at a release.
         self._camera_pause = clock.Pause(FOLLOW_SECONDS, self._follow)
         self.pauses = self._drag_pause, self._quiet_pause, self._camera_pause
-        self.worker = Worker(self._tell, preload=TASKS)
+        self.jobs = Jobs(self._tell)
         gui = server.gui
         gui.set_panel_label(TITLE)
         self.buttons = Buttons(server)
@@ -153,9 +155,9 @@ class Page:
         self.services = Services(
             server,
             self.session,
-            self.worker,
+            self.jobs,
             self.buttons,
-            Downloads(server, self.worker, self._complain),
+            Downloads(server, self.jobs, self._complain),
             self._complain,
             self._tell,
             theme,
@@ -169,7 +171,7 @@ class Page:
         server.scene.set_up_direction("+z")
         self._features = self.services.features
         self._scene = [self.services.get(part) for each in self._features for part in each.scene]
-        # The worker computes in the order of their requests. The scene alone needs those feeds
+        # The process computes in the order of their requests. The scene alone needs those feeds
         # only of which it draws.
         kinds = [kind for feature in self._features for kind in feature.feeds]
         kinds += [kind for feature in self._features for kind in feature.later_feeds]
@@ -204,10 +206,10 @@ class Page:
             for runner in self.runners:
                 runner.prepare()
 
-        self.worker.start(then=prepare)
+        self.jobs.prepare(PAGE, TASKS, prepare)
 
     def stop(self) -> None:
-        """End the session, the features and the worker; keep what long work has found so far."""
+        """End the session, the features and the processes; keep what long work has found so far."""
         for runner in self.runners:
             runner.finish()
         for pause in self.pauses:
@@ -218,7 +220,7 @@ class Page:
         self.services.downloads.stop()
         if self.autosaver is not None:
             self.autosaver.stop()
-        self.worker.stop()
+        self.jobs.stop()
 
     def point_cameras(self, view: ViewName) -> None:
         """Point the camera of every open browser."""

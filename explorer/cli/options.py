@@ -27,6 +27,7 @@ from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.reactions import has_limits
+from explorer.workspace.workspace import Workspace
 
 if TYPE_CHECKING:
     from explorer.workspace.carried_region import CarriedRegion
@@ -297,14 +298,12 @@ def check_has_limits(design: Design) -> None:
         )
 
 
-def carrying_part(
-    design: Design, rotation: FloatArray, load: Six, tolerance: float | None
-) -> CarriedRegion:
+def carrying_part(workspace: Workspace, load: Six, tolerance: float | None) -> CarriedRegion:
     """Return the part of the workspace of a design with limits that holds a load.
 
     The load is (F; M) at the tool besides the payload, base axes, in N and N × unit.
     """
     from explorer.workspace.carried_region import carried_region
 
-    check_has_limits(design)
-    return carried_region(design, rotation, load, tolerance=tolerance)
+    check_has_limits(workspace.design)
+    return carried_region(workspace, load, tolerance=tolerance)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import ExplorerError, NoAnswerError
@@ -22,17 +21,15 @@ from explorer.export.mesh import colour_of
 from explorer.export.opencascade import Document, ExactShape, occ, primitive
 from explorer.files.extras import check_extra
 from explorer.measures.box import corners_of
-from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
     Constraint,
-    constraints,
-    orientation_of,
 )
-from explorer.workspace.limits.region import Region, region_of
-from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.limits.region import Region
+from explorer.workspace.slices.volume import volume_of
+from explorer.workspace.workspace import Workspace
 
 GOOD_ERROR, LARGEST_ERROR = 1e-6, 1e-4
 """Relative errors of the volume: the first is accepted at once, beyond the last is refused."""
@@ -64,28 +61,23 @@ class ExactSolid:
         return replace(self, shape=ExactShape(self.shape).translate(triple(offset)).shape)
 
 
-def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactSolid:
-    """Return the constant-orientation workspace with its exact faces.
-
-    The rotation is from platform to base, shape (3, 3); that of the home pose if None.
+def exact_workspace(workspace: Workspace) -> ExactSolid:
+    """Return a workspace with its exact faces.
 
     Raises:
         MissingExtraError: OpenCASCADE is not installed.
-        InputError: The rotation is not one.
         NoAnswerError: The workspace is empty.
         ExplorerError: A boolean operation fails, or OpenCASCADE is off by too much of the volume.
     """
     check_extra("cad")
-    r = orientation_of(design, rotation)
-    exact = workspace_volume(design, r)
+    exact = volume_of(workspace)
     if exact.volume <= 0.0:
         reason = ", ".join(exact.empty_because)
         raise NoAnswerError(f"there is nothing to export, the workspace is empty: {reason}")
-    limits, unit = constraints(design, r), design.unit_mm
-    region = region_of(limits)
-    lows, highs = (end * unit for end in region.ends)
+    limits, unit = workspace.limits, workspace.design.unit_mm
+    lows, highs = (end * unit for end in workspace.region.ends)
     best, least_error = None, math.inf
-    for shape in _Primitives(lows, highs, unit).attempts(limits, region):
+    for shape in _Primitives(lows, highs, unit).attempts(limits, workspace.region):
         faces = cad.faces_of(shape)
         solid = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in faces))
         error = abs(solid.volume / unit**3 - exact.volume) / exact.volume

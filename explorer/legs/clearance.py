@@ -21,10 +21,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from explorer.mechanism.configuration import Configuration, computed_once
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DEGENERATE_RATIO, Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.computed_once import computed_once
 from explorer.numerics.vectors import Vector, cross3, dot3, minus
 
 

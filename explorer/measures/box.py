@@ -26,6 +26,7 @@ from explorer.statics import compliance, slopes
 from explorer.statics.accuracy import ToolError, actuator_errors, worst_errors
 from explorer.statics.reactions import largest_accelerations, limit_shares, payload_reactions
 from explorer.workspace.least_clearance import node_measures
+from explorer.workspace.workspace import Workspace
 
 BOX_NODES = 9
 """Number of nodes on each axis of the grid over a required box, its faces included."""
@@ -76,7 +77,7 @@ def positions_over(
         if box is None:
             raise InputError("positions over a box need a box, and the design has none")
         return box_nodes(box)
-    nodes = node_measures(design, pose.rotation).positions
+    nodes = node_measures(Workspace(design, pose.rotation)).positions
     if not len(nodes):
         raise NoAnswerError("no position of a grid of 20 × 20 × 20 nodes is within the limits")
     return nodes

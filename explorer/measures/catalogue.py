@@ -13,6 +13,7 @@ from explorer.measures.loads import loads
 from explorer.measures.measure import NEEDS, Case, Measure, Place
 from explorer.measures.workspace import coordinates, workspace_measures
 from explorer.mechanism.design import Design
+from explorer.numerics.computed_once import computed_once
 
 CATALOGUE: Mapping[str, Measure] = {
     measure.name: measure
@@ -66,6 +67,11 @@ def measure_design(case: Case, names: Iterable[str]) -> Measurements:
     Raises:
         ExplorerError: A mesh that is needed cannot be made.
     """
+    return _measure(case, tuple(names))
+
+
+@computed_once
+def _measure(case: Case, names: tuple[str, ...]) -> Measurements:
     values: dict[str, float | None] = {}
     infinite: list[str] = []
     for name in names:

@@ -19,6 +19,7 @@ from explorer.measures.snapshot import PoseIndices
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.computed_once import computed_once
 from explorer.numerics.number_text import Unit
 from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import has_limits
@@ -29,7 +30,8 @@ from explorer.workspace.least_clearance import (
     least_clearances,
     node_measures,
 )
-from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import NodeCount, Volume, node_count_of, volume_of
+from explorer.workspace.workspace import Workspace
 
 if TYPE_CHECKING:
     from explorer.workspace.carried_region import CarriedRegion
@@ -53,8 +55,7 @@ def longest_leg(design: Design) -> float:
 class Case:
     """A design to measure; lengths in design units.
 
-    All values describe the constant-orientation workspace, except for those at home. Each
-    intermediate result is computed when a measure first needs it.
+    All values describe the constant-orientation workspace, except for those at home.
 
     Attributes:
         design: The manipulator.
@@ -91,24 +92,25 @@ class Case:
         return self.at.rotation
 
     @cached_property
+    def workspace(self) -> Workspace:
+        """The workspace."""
+        return Workspace(self.design, self.rotation)
+
+    @property
     def volume(self) -> Volume:
         """The exact volume, its gradient, and the limits that empty the workspace."""
-        return workspace_volume(self.design, self.rotation)
+        return volume_of(self.workspace)
 
-    @cached_property
+    @property
     def paper_nodes(self) -> NodeCount:
         """The paper's nodes; an InputError if the grid is too fine to count."""
-        return workspace_nodes(self.design, self.rotation, self.node_step)
+        return node_count_of(self.workspace, self.node_step)
 
-    @cached_property
+    @property
     def at_nodes(self) -> NodeMeasures:
         """Extent, margins and clearances at the nodes of a grid over the workspace."""
-        return node_measures(
-            self.design,
-            self.rotation,
-            nodes=self.nodes,
-            clearance_margin=self.clearance_margin,
-        )
+        margin = self.clearance_margin
+        return node_measures(self.workspace, nodes=self.nodes, clearance_margin=margin)
 
     @cached_property
     def home_indices(self) -> PoseIndices:
@@ -121,7 +123,7 @@ class Case:
         """The indices of conditioning, manipulability and transmission at the nodes."""
         return PoseIndices(self.design, self.at_nodes.positions, self.rotation)
 
-    @cached_property
+    @property
     def clearance(self) -> tuple[float, tuple[int, int] | None]:
         """The least clearance where every |δ| is at least `clearance_margin`, and its two legs.
 
@@ -129,51 +131,36 @@ class Case:
         Both are NaN and None where the workspace has no such position, or no volume: the positions
         left may then all lie on a surface.
         """
-        return self._clearance_beyond(self.clearance_margin)
+        return _clearance_beyond(self.workspace, self.clearance_margin)
 
-    @cached_property
+    @property
     def demanded_clearance(self) -> tuple[float, tuple[int, int] | None]:
         """The least clearance where every |δ| is at least `demanded_margin`, and its two legs."""
         if self.demanded_margin is None:
             return math.nan, None
-        return self._clearance_beyond(self.demanded_margin)
+        return _clearance_beyond(self.workspace, self.demanded_margin)
 
-    def _clearance_beyond(self, margin: float) -> tuple[float, tuple[int, int] | None]:
-        if self.volume.volume <= 0.0:
-            return math.nan, None
-        design = self.design
-        clearances = least_clearances(
-            design.with_limits(margin=max(design.limits.margin or 0.0, margin)),
-            self.rotation,
-            CERTAIN * design.reach,
-            only_least=True,
-        ).clearance
-        pair = int(clearances.argmin())
-        if not np.isfinite(clearances[pair]):
-            return math.nan, None
-        return float(clearances[pair]), PAIRS[pair]
-
-    @cached_property
+    @property
     def extent(self) -> FloatArray:
         """The exact extents of the workspace on the axes, shape (3,); NaN if it is empty."""
-        ends = extent_of(self.design, self.rotation) if self.volume.volume > 0.0 else None
+        ends = extent_of(self.workspace) if self.volume.volume > 0.0 else None
         return np.full(3, math.nan) if ends is None else ends[1] - ends[0]
 
-    @cached_property
+    @property
     def least_margins(self) -> FloatArray:
         """The least |δ1|, |δ2|, |δ3| in the workspace, exact, shape (3,); NaN if it is empty."""
-        least = least_margins(self.design, self.rotation) if self.volume.volume > 0.0 else None
+        least = least_margins(self.workspace) if self.volume.volume > 0.0 else None
         return np.full(3, math.nan) if least is None else least
 
-    @cached_property
+    @property
     def accessible_volume(self) -> tuple[float, str]:
         """The volume that a collision-free move from home leads to; else NaN and the reason."""
         # Both load the kernel of solids.
         from explorer.workspace.accessible.nodes import StartError
-        from explorer.workspace.accessible.workspace import accessible_workspace
+        from explorer.workspace.accessible.workspace import accessible_part
 
         try:
-            return accessible_workspace(self.design, self.rotation).accessible_volume, ""
+            return accessible_part(self.workspace).accessible_volume, ""
         except StartError as error:
             return math.nan, str(error)
 
@@ -188,17 +175,33 @@ class Case:
         home = self.design.home_pose
         return BoxStatics(self.design, (home.position, home.position), home.rotation)
 
-    @cached_property
+    @property
     def carried_region(self) -> CarriedRegion:
         """The part of the workspace where the design's load is held."""
         # It loads the kernel of solids.
         from explorer.workspace.carried_region import carried_region
 
-        return carried_region(self.design, self.rotation)
+        return carried_region(self.workspace)
 
     def has(self, need: str) -> bool:
         """Return whether the case has what a measure needs."""
         return NEEDS[need][1](self)
+
+
+@computed_once
+def _clearance_beyond(workspace: Workspace, margin: float) -> tuple[float, tuple[int, int] | None]:
+    """Return the least clearance where every |δ| is at least a margin, and its two legs."""
+    if volume_of(workspace).volume <= 0.0:
+        return math.nan, None
+    design = workspace.design
+    away = design.with_limits(margin=max(design.limits.margin or 0.0, margin))
+    clearances = least_clearances(
+        Workspace(away, workspace.rotation), CERTAIN * design.reach, only_least=True
+    ).clearance
+    pair = int(clearances.argmin())
+    if not np.isfinite(clearances[pair]):
+        return math.nan, None
+    return float(clearances[pair]), PAIRS[pair]
 
 
 Place = Literal["compare", "optimise", "studies", "workspace", "report"]

@@ -6,10 +6,8 @@ use and kept, so that no two of them compute it twice. Its point may be named: b
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +19,6 @@ from explorer.mechanism.points import AttachmentPoints, joints_of, points_of
 from explorer.mechanism.pose import Pose, Triple, rotation_array
 from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray
-
-Value = TypeVar("Value")
 
 WITHOUT_TOOL = (
     *("points", "legs", "leg_lengths", "leg_directions", "joints", "margins"),
@@ -207,22 +203,6 @@ class Configuration:
     def rows_or_one(self, vectors: FloatArray) -> FloatArray:
         """Return vectors (..., k) as one row for each pose, or as one row for all."""
         return arrays.for_kernel(vectors[None]) if vectors.ndim == 1 else self.rows(vectors)
-
-
-def computed_once(
-    function: Callable[[Configuration], Value],
-) -> Callable[[Configuration], Value]:
-    """Return a function of a configuration whose value is kept in the configuration."""
-    key = f"{function.__module__}.{function.__qualname__}"
-
-    @functools.wraps(function)
-    def value_of(configuration: Configuration) -> Value:
-        kept = configuration.__dict__
-        if key not in kept:
-            kept[key] = function(configuration)
-        return kept[key]
-
-    return value_of
 
 
 Point = Literal["b4", "tool"]

@@ -21,6 +21,7 @@ from explorer.numerics.number_text import format_apart
 
 Pair = tuple[float, float]
 Six = tuple[float, float, float, float, float, float]
+NO_LOAD: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, in m/s²."""

@@ -21,11 +21,12 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.configuration import Configuration, computed_once
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import SINGULAR, margins_at, margins_of
 from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.numerics.checks import FARTHEST
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.computed_once import computed_once
 from explorer.numerics.vectors import Vector, along, column, cross3, dot3, times
 
 # |p| over the reach up to which b4 is at a1, where all margins vanish.

@@ -19,8 +19,7 @@ from explorer.legs.clearance import PAIRS, leg_axes, pair_rows
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.motion.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
-from explorer.workspace.limits.constraints import constraints
-from explorer.workspace.limits.region import region_of
+from explorer.workspace.workspace import Workspace
 
 CLEARANCE = 0.2
 """Clearance between parts that move against each other."""
@@ -223,7 +222,7 @@ class Sizes:
         if design.limits.guide is not None:
             low, high = design.limits.guide
             return StrokeRange(low * design.unit_mm, high * design.unit_mm)
-        region = region_of(constraints(design, home.rotation))
+        region = Workspace(design).region
         shift = float(home.rotation[0, 0]) * (design.b2 if leg == 2 else design.b3)
         low, high = region.low, region.high
         if region.is_flat or not low < high:

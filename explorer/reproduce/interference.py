@@ -15,7 +15,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.reproduce.claim import Measurement, judge
 from explorer.reproduce.six_legs import six_four_twin
-from explorer.workspace.limits.constraints import constraints, satisfies
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 ROTATION = OPTIMAL.home_pose.rotation
@@ -210,4 +210,4 @@ def _nodes(step: float, lowest: float) -> FloatArray:
 
 
 def _within(positions: FloatArray) -> BoolArray:
-    return np.asarray(satisfies(OPTIMAL, constraints(OPTIMAL, ROTATION), positions).all(axis=-1))
+    return np.asarray(Workspace(OPTIMAL, ROTATION).satisfies(positions).all(axis=-1))

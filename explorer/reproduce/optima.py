@@ -20,6 +20,7 @@ from explorer.optimise.problem import YAW, Box, with_values
 from explorer.optimise.solver import optimise_design
 from explorer.reproduce.claim import Measurement, Values, below, judge
 from explorer.workspace.slices import volume
+from explorer.workspace.workspace import Workspace
 
 Extent = tuple[tuple[float, float, float], tuple[float, float, float]]
 
@@ -64,7 +65,7 @@ def measure_table() -> Measurement:
     rows = [
         Row(
             name,
-            volume.workspace_nodes(PRESETS[name]),
+            volume.node_count_of(Workspace(PRESETS[name])),
             volume.workspace_volume(PRESETS[name]).volume,
         )
         for name in PRINTED
@@ -72,7 +73,7 @@ def measure_table() -> Measurement:
     optimal, initial = PRESETS["paper-optimal"], PRESETS["paper-initial"]
     by_yaw = {
         yaw: (
-            volume.workspace_nodes(with_values(optimal, {YAW: yaw})).count,
+            volume.node_count_of(Workspace(with_values(optimal, {YAW: yaw}))).count,
             _initial_off(initial, yaw),
         )
         for yaw in YAWS
@@ -145,7 +146,9 @@ def _extent(nodes: volume.NodeCount) -> Extent:
 
 def _initial_off(design: Design, yaw: float) -> float:
     """Return the largest difference of an extent at a yaw from that of the initial row."""
-    return Row("paper-initial", volume.workspace_nodes(with_values(design, {YAW: yaw})), 0.0).off
+    return Row(
+        "paper-initial", volume.node_count_of(Workspace(with_values(design, {YAW: yaw}))), 0.0
+    ).off
 
 
 def _lines(row: Row) -> list[str]:

@@ -19,12 +19,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.configuration import Configuration, computed_once
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import INCIDENCES, ROUNDING, margins_at
 from explorer.mechanism.pose import Pose, rotation_array
 from explorer.numerics.arrays import FloatArray, batch_shape, dot, position_array
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.computed_once import computed_once
 from explorer.singularity.nearest_lines import (
     ROOM,
     constants_at,

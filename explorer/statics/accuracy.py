@@ -20,12 +20,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.configuration import Configuration, computed_once
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
 from explorer.motion.inverse_jacobian import A3X, A3Y, B1X, B1Y, B2, B3, twists_of_actuators
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, lengths_of
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.computed_once import computed_once
 from explorer.numerics.zonotope import signs_of_longest_sums
 
 # First columns of the dimensions, in the order of `DIMENSIONS`.

@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.configuration import Configuration, computed_once
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.pose import Triple
 from explorer.motion.inverse_jacobian import forces_of, twists_of_actuators
 from explorer.motion.weights import Carried, MovingBodies, carry
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
+from explorer.numerics.computed_once import computed_once
 
 LIMITED = (
     *JOINTS,

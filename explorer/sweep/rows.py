@@ -195,12 +195,6 @@ def check_study(study: Study) -> None:
         raise InputError(f"the designs of the study have {lacking}")
 
 
-def load_common() -> None:
-    """Load the modules and kernels that most studies need, so that the first rows come at once."""
-    importlib.import_module("scipy.stats")
-    warm()
-
-
 def load_kernels(study: Study) -> None:
     """Import all kernels that the rows of a study may need."""
     for is_needed, module in (

@@ -23,23 +23,21 @@ from operator import itemgetter
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from explorer.mechanism.design import TOLERANCE, Design
+from explorer.mechanism.design import TOLERANCE
 from explorer.mechanism.margins import planes_of_singularity
-from explorer.mechanism.pose import rotation_array
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot, rotate
+from explorer.numerics.computed_once import computed_once
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
     Constraint,
     HalfSpace,
     Never,
-    constraints,
     shift,
     surface_of,
 )
-from explorer.workspace.limits.region import box_of
+from explorer.workspace.workspace import Workspace
 
 # Degree of the resultant in the cosine and sine of the angle, and angles that determine it.
 DEGREE = 4
@@ -57,32 +55,32 @@ _Row: TypeAlias = tuple[int, FloatArray, float, FloatArray, float]
 NEAR = 1e-3
 
 
-def extent_of(design: Design, rotation: ArrayLike) -> tuple[FloatArray, FloatArray] | None:
+@computed_once
+def extent_of(workspace: Workspace) -> tuple[FloatArray, FloatArray] | None:
     """Return (lows, highs) of a workspace, each (3,), in design units; None if it has no volume."""
-    points = extreme_positions(design, rotation_array(rotation), np.zeros((0, 3)))
+    points = extreme_positions(workspace, np.zeros((0, 3)))
     return (points.min(axis=0), points.max(axis=0)) if len(points) else None
 
 
-def least_margins(design: Design, rotation: ArrayLike) -> FloatArray | None:
+@computed_once
+def least_margins(workspace: Workspace) -> FloatArray | None:
     """Return the least |δ1|, |δ2| and |δ3| in a workspace, in design units; None as `extent_of`."""
-    r = rotation_array(rotation)
-    gradients = planes_of_singularity(r)
-    points = extreme_positions(design, r, gradients)
+    gradients = planes_of_singularity(workspace.rotation)
+    points = extreme_positions(workspace, gradients)
     if not len(points):
         return None
     least = np.abs(points @ gradients.T).min(axis=0)
-    least[least <= design.tolerance] = 0.0
+    least[least <= workspace.design.tolerance] = 0.0
     return least
 
 
-def extreme_positions(design: Design, rotation: FloatArray, normals: FloatArray) -> FloatArray:
+def extreme_positions(workspace: Workspace, normals: FloatArray) -> FloatArray:
     """Return positions in a workspace, shape (n, 3), the extreme ones among them.
 
     They are extreme along the axes and along the normals, shape (m, 3), in the whole workspace and
     on either side of the planes through a1 with these normals.
     """
-    limits = constraints(design, rotation)
-    box = box_of(limits)
+    limits, box = workspace.limits, workspace.region.box
     if box is None:
         return np.zeros((0, 3))
     lows, highs = box
@@ -111,7 +109,7 @@ def extreme_positions(design: Design, rotation: FloatArray, normals: FloatArray)
     kept = within(points, NEAR * unit)
     refined = surfaces.refine(points[kept], equations[kept], directions)
     found = np.vstack([points[kept], refined, surfaces.poles(directions)])
-    return middle + unit * found[within(found, TOLERANCE * max([design.reach, *radii]))]
+    return middle + unit * found[within(found, TOLERANCE * max([workspace.design.reach, *radii]))]
 
 
 @dataclass(frozen=True)

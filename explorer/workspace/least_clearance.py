@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import (
     PAIRS,
@@ -27,11 +26,10 @@ from explorer.legs.clearance import (
     leg_clearances,
     radii_of_pairs,
 )
-from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.checks import whole
+from explorer.numerics.computed_once import computed_once
 from explorer.numerics.search import descend
 from explorer.workspace.clearance_bounds import (
     LEGS_OF_PAIRS,
@@ -39,8 +37,8 @@ from explorer.workspace.clearance_bounds import (
     bound_slacks,
     raise_bounds,
 )
-from explorer.workspace.limits.constraints import Constraint, constraints, orientation_of
-from explorer.workspace.limits.region import box_of, mark_nodes, region_of
+from explorer.workspace.limits.region import mark_nodes
+from explorer.workspace.workspace import Workspace
 
 # Tolerance of a least clearance, over the reach.
 DEFAULT_TOLERANCE = 1e-4
@@ -73,9 +71,9 @@ class LeastClearances(NamedTuple):
     position: FloatArray
 
 
+@computed_once
 def least_clearances(
-    design: Design,
-    rotation: ArrayLike | None = None,
+    workspace: Workspace,
     tolerance: float | None = None,
     *,
     only_least: bool = False,
@@ -85,8 +83,7 @@ def least_clearances(
     """Return the least clearances in the constant-orientation workspace.
 
     Args:
-        design: The manipulator; the radii of the legs are those of its limits.
-        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+        workspace: The workspace; the radii of the legs are those of its design's limits.
         tolerance: Largest difference between a clearance and its bound, in design units; a
             10,000th of the reach if None. It is exceeded where too many cells are left.
         only_least: Whether to resolve the least of the six alone, which takes far less time;
@@ -95,19 +92,16 @@ def least_clearances(
             closer has the clearance inf, and that is proven without a tolerance; other pairs have
             positions strictly within limits.
         margin: Least |δ| of the positions that count, in design units.
-
-    Raises:
-        InputError: Not a rotation.
     """
-    r = orientation_of(design, rotation)
+    design, r = workspace.design, workspace.rotation
     resolution = tolerance or DEFAULT_TOLERANCE * design.reach
-    domain = _Domain(design, r, constraints(design, r), margin)
+    domain = _Domain(workspace, margin)
     radii, joined = radii_of_pairs(design), joined_pairs(design)
     best = np.where(joined, math.inf, below + radii)
     positions = np.full((len(PAIRS), 3), math.nan)
     # The least bound of the cells of each pair that are not divided any further.
     settled = np.full(len(PAIRS), math.inf)
-    box = box_of(domain.limits)
+    box = workspace.region.box
     if box is None:
         return LeastClearances(settled, settled, positions)
     # Legs 2 and 3 lie in planes across the guide, whose distance is the same at every position.
@@ -132,7 +126,7 @@ def least_clearances(
         for part in np.array_split(middles, 1 + len(middles) // BATCH):
             slack = domain.bound_slacks(part, half)
             is_near = slack.largest(half).min(axis=-1, initial=math.inf) >= 0.0
-            at, slack = Configuration(design, part[is_near], r), slack.of(is_near)
+            at, slack = workspace.at(part[is_near]), slack.of(is_near)
             distance, inside = leg_clearances(at).distance, domain.contains(at.position)
             better = np.zeros(len(PAIRS), dtype=np.bool_)
             if inside.any():
@@ -184,24 +178,20 @@ def least_clearances(
 class _Domain:
     """The positions that count: those within the limits and off the singular planes."""
 
-    design: Design
-    rotation: FloatArray
-    limits: tuple[Constraint, ...]
+    workspace: Workspace
     margin: float
 
     def contains(self, p: FloatArray) -> BoolArray:
         """Return whether positions (..., 3) are in the domain."""
         is_within = (self._spare_margins(p) >= 0.0).all(axis=-1)
-        for limit in self.limits:
-            is_within &= limit.slack(p) >= 0.0
-        return np.asarray(is_within)
+        return np.asarray(is_within & self.workspace.contains(p))
 
     def bound_slacks(self, middles: FloatArray, half: FloatArray) -> SlackBounds:
         """Return bounds of the slacks in cells with middles (n, 3) and half edges (3,)."""
-        bounds = bound_slacks(self.limits, middles, half)
+        bounds = bound_slacks(self.workspace.limits, middles, half)
         if not self.margin:
             return bounds
-        planes = planes_of_singularity(self.rotation)
+        planes = planes_of_singularity(self.workspace.rotation)
         sizes, change = middles @ planes.T, np.abs(planes) @ half
         # On one side of its plane |δ| is linear.
         is_beside = np.abs(sizes) >= change
@@ -211,15 +201,15 @@ class _Domain:
 
     def descend(self, pair: int, least: float, position: FloatArray) -> tuple[float, FloatArray]:
         """Return the least distance near a position in the domain, and where it is attained."""
-        design, reach = self.design, self.design.reach
+        reach = self.workspace.design.reach
 
         def distance(p: FloatArray) -> tuple[float, FloatArray]:
-            at = Configuration(design, p * reach, self.rotation)
+            at = self.workspace.at(p * reach)
             return float(leg_clearances(at).distance[pair]) / reach, distance_gradients(at)[pair]
 
         def slacks(p: FloatArray) -> FloatArray:
-            of_limits = [float(limit.slack(p * reach)) for limit in self.limits]
-            return np.array([*of_limits, *self._spare_margins(p * reach)]) / reach
+            of_limits = self.workspace.slacks(p * reach)
+            return np.concatenate([of_limits, self._spare_margins(p * reach)]) / reach
 
         optimum = descend(distance, slacks, position / reach)
         if optimum is None or not (slacks(optimum) >= -CROSSING).all():
@@ -231,7 +221,7 @@ class _Domain:
         """Return |δ| less the margin at positions (..., 3), shape (..., 3); (..., 0) if it is 0."""
         if not self.margin:
             return np.zeros((*p.shape[:-1], 0))
-        return np.abs(margins(p, self.rotation)) - self.margin
+        return np.abs(margins(p, self.workspace.rotation)) - self.margin
 
 
 # Number of nodes on each axis: default, least and largest.
@@ -263,28 +253,23 @@ class NodeMeasures:
     clear_share: float
 
 
+@computed_once
 def node_measures(
-    design: Design,
-    rotation: ArrayLike | None = None,
-    *,
-    nodes: int = DEFAULT_NODES,
-    clearance_margin: float = 0.0,
+    workspace: Workspace, *, nodes: int = DEFAULT_NODES, clearance_margin: float = 0.0
 ) -> NodeMeasures:
     """Measure the constant-orientation workspace at the nodes of a grid.
 
     Args:
-        design: The manipulator; the radii of the legs are those of its limits.
-        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+        workspace: The workspace; the radii of the legs are those of its design's limits.
         nodes: Number of nodes on each axis of a box about the workspace.
         clearance_margin: Least |δ|, in design units, of nodes at which clearances count;
             nearer to a singularity legs may have to meet.
 
     Raises:
-        InputError: Not a rotation, or too few or too many nodes.
+        InputError: Too few or too many nodes.
     """
     whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
-    r = orientation_of(design, rotation)
-    region = region_of(constraints(design, r))
+    region = workspace.region
     lows, highs = region.box or (np.zeros(3), np.zeros(3))
     step, within = (highs - lows) / nodes, np.zeros((nodes,) * 3, dtype=np.bool_)
     if region.box is not None:
@@ -294,7 +279,7 @@ def node_measures(
         none = np.full(3, np.nan)
         clearances = np.full(len(PAIRS), math.inf)
         return NodeMeasures(np.zeros((0, 3)), none, none, math.nan, clearances, math.nan)
-    at = Configuration(design, lows + (indices + 0.5) * step, r)
+    at = workspace.at(lows + (indices + 0.5) * step)
     sizes, clearance = np.abs(at.margins), leg_clearances(at).clearance
     smallest = sizes.min(axis=1)
     off_planes = clearance[smallest >= clearance_margin]

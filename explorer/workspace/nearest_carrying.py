@@ -15,14 +15,13 @@ import numpy as np
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, triple
+from explorer.numerics.arrays import FloatArray, IntArray, triple
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.workspace.accessible.nodes import descend_towards, make_grid
 from explorer.workspace.carried_region import best_positions, positions_within
-from explorer.workspace.limits.constraints import Constraint, constraints, slacks
-from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
-from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.solids.solids import whole_solid
+from explorer.workspace.workspace import Workspace
 
 NODES = 25
 """Number of nodes of each grid on each axis."""
@@ -44,13 +43,13 @@ def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
     # A margin of zero takes the sign of home.
     x, y, z = (sign or home for sign, home in zip(own, design.home_signs, strict=True))
     signs = x, y, z
-    whole = workspace_solid(design, pose.rotation, signs=signs)
+    workspace = Workspace(design, pose.rotation, signs=signs)
+    whole = whole_solid(workspace)
     if whole.is_empty:
         return None
-    search = _Search(loaded, Rules.of(design, signs), constraints(design, pose.rotation, signs))
-    ends = whole.ends
+    search, ends = _Search(loaded, workspace), whole.ends
     grid = make_grid(*ends, NODES, 0)
-    tried = np.vstack([search.here, positions_within(whole, grid, search.allows)])
+    tried = np.vstack([search.here, positions_within(whole, grid, workspace.is_valid)])
     found = search.nearest(tried, grid.step)
     if found is None:
         return None
@@ -63,7 +62,7 @@ def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
         grid = make_grid(lows, highs, NODES, 0)
         tried = grid.positions.reshape(-1, 3)
         tried = tried[search.distance(tried) < (1.0 - NEARER) * distance]
-        nearer = search.nearest(tried[search.allows(tried)], grid.step)
+        nearer = search.nearest(tried[workspace.is_valid(tried)], grid.step)
         if nearer is None or search.distance(nearer) >= (1.0 - NEARER) * distance:
             break
         found = nearer
@@ -76,13 +75,11 @@ class _Search:
 
     Attributes:
         loaded: The pose under the load.
-        rules: All demands on a pose, in the mode of the given one.
-        limits: The same limits of positions, without clearances.
+        workspace: The workspace in the mode of the pose.
     """
 
     loaded: LoadedPose
-    rules: Rules
-    limits: tuple[Constraint, ...]
+    workspace: Workspace
 
     @property
     def here(self) -> FloatArray:
@@ -92,11 +89,6 @@ class _Search:
     def distance(self, positions: FloatArray) -> FloatArray:
         """Return the distances of positions (..., 3) from the pose, shape (...)."""
         return np.asarray(np.linalg.norm(positions - self.here, axis=-1))
-
-    def allows(self, positions: FloatArray) -> BoolArray:
-        """Return which positions (n, 3) keep all limits and clearances, shape (n,)."""
-        design, rotation = self.loaded.design, self.loaded.pose.rotation
-        return poses_are_valid(design, positions, rotation, rules=self.rules)
 
     def largest(self, positions: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the largest shares of a limit at positions (n, 3), and the parts, (n,) each."""
@@ -110,14 +102,14 @@ class _Search:
         holds = self.largest(tried)[0] <= 1.0
         starts, others = tried[holds], tried[~holds]
         if len(others):
-            better = best_positions(others, step, self.largest, self.allows, 1.0 - KEPT)
+            better = best_positions(others, step, self.largest, self.workspace.is_valid, 1.0 - KEPT)
             starts = np.vstack([starts, *(best.position for best in better if best.share <= 1.0)])
         if not len(starts):
             return None
         starts = starts[self.distance(starts).argsort()[:BEGINNINGS]]
         # Clearances are no constraints of the descent, so that it may end where legs collide.
         ends = np.vstack([starts, *map(self._descend, starts)])
-        ends = ends[self.allows(ends)]
+        ends = ends[self.workspace.is_valid(ends)]
         ends = ends[self.largest(ends)[0] <= 1.0]
         return ends[self.distance(ends).argmin()] if len(ends) else None
 
@@ -128,7 +120,7 @@ class _Search:
         def spare(at: FloatArray) -> FloatArray:
             # Near a singular plane shares are infinite, and the descent turns back.
             shares = np.minimum(self._shares(reach * at), FAR)
-            return np.concatenate([1.0 - KEPT - shares, slacks(self.limits, reach * at) / reach])
+            return np.concatenate([1.0 - KEPT - shares, self.workspace.slacks(reach * at) / reach])
 
         return descend_towards(self.here, spare, start, reach)
 

@@ -14,12 +14,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import NO_LOAD
 from explorer.motion.weights import payload_wrench
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.computed_once import computed_once
 from explorer.singularity import colours
 from explorer.singularity.colours import (
     CLEAR,
@@ -35,8 +36,7 @@ from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, deflection, is_elastic, stiffness_of
 from explorer.statics.load_cases import largest_shares, load_case
 from explorer.statics.reactions import has_limits
-from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.limits.region import box_of
+from explorer.workspace.workspace import Workspace
 
 PositionMeasure = Literal["margin", "condition", "share", "force", "bending", "error", "deflection"]
 
@@ -85,39 +85,42 @@ class PositionBands:
     values: Callable[[FloatArray], FloatArray]
 
 
+@computed_once
 def position_bands(
-    design: Design,
-    rotation: FloatArray,
+    workspace: Workspace,
     measure: PositionMeasure,
     *,
     warn_below: float,
-    load: FloatArray | None = None,
+    load: tuple[float, ...] = NO_LOAD,
 ) -> PositionBands:
     """Return the bands of a measure.
 
     Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
+        workspace: The workspace.
         measure: The measure.
         warn_below: Length below which margins raise a warning, in design units; the warning value
             of the inverse condition number follows it.
         load: (F; M) on the platform at the tool point besides the payload, base axes, shape (6,),
-            in N and N × unit; None for none. Only measures of a load need it.
+            in N and N × unit. Only measures of a load need it.
     """
 
     def measure_at(points: FloatArray) -> FloatArray:
-        return measure_positions(design, rotation, measure, points, load)[0]
+        return measure_positions(workspace, measure, points, load)[0]
 
     if measure in ("margin", "condition"):
         is_margin = measure == "margin"
-        unit = warn_below if is_margin else colours.warning_condition(design.reach, warn_below)
+        unit = (
+            warn_below
+            if is_margin
+            else colours.warning_condition(workspace.design.reach, warn_below)
+        )
         edges, levels = colours.BAND_EDGES, tuple(unit * edge for edge in colours.BAND_EDGES)
         own = colours.band_colours()
         return PositionBands(measure, edges, own, levels, lambda points: measure_at(points) / unit)
     if measure == "share":
         levels, own = SHARES, SHARE_COLOURS
     else:
-        levels, own = _round_levels(design, rotation, measure_at), STEP_COLOURS
+        levels, own = _round_levels(workspace, measure_at), STEP_COLOURS
     highest = levels[-1]
     edges = (0.0, *(highest / level for level in reversed(levels)))
 
@@ -128,11 +131,10 @@ def position_bands(
 
 
 def measure_positions(
-    design: Design,
-    rotation: FloatArray,
+    workspace: Workspace,
     measure: PositionMeasure,
     positions: FloatArray,
-    load: ArrayLike | None = None,
+    load: tuple[float, ...] = NO_LOAD,
 ) -> tuple[FloatArray, IntArray]:
     """Return a measure at positions (n, 3), and the margin or part that has it, (n,) each.
 
@@ -140,9 +142,9 @@ def measure_positions(
     `explorer.statics.reactions.part_limits`; the index is 0 for a measure of the whole machine. The
     load is as in `position_bands`.
     """
+    design, rotation = workspace.design, workspace.rotation
     at = Configuration(design, positions, rotation, design.tool.position)
-    whole = np.zeros(len(positions), dtype=np.int64)
-    w = np.zeros(6) if load is None else np.asarray(load, dtype=np.float64)
+    whole, w = np.zeros(len(positions), dtype=np.int64), np.array(load)
     match measure:
         case "margin":
             sizes = np.abs(at.margins)
@@ -185,14 +187,13 @@ def is_unstated(design: Design, measure: PositionMeasure) -> bool:
 
 
 def _round_levels(
-    design: Design, rotation: FloatArray, measure_at: Callable[[FloatArray], FloatArray]
+    workspace: Workspace, measure_at: Callable[[FloatArray], FloatArray]
 ) -> tuple[float, ...]:
     """Return round numbers that suit the measure within the limits, ascending."""
-    limits = constraints(design, rotation)
-    lows, highs = box_of(limits) or (np.zeros(3), np.full(3, design.reach))
+    lows, highs = workspace.region.box or (np.zeros(3), np.full(3, workspace.design.reach))
     shares = (np.indices((NODES,) * 3).reshape(3, -1).T + 1.0) / (NODES + 1)
     nodes = lows + (highs - lows) * shares
-    within = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]
+    within = nodes[workspace.contains(nodes)]
     found = measure_at(within if len(within) else nodes)
     found = found[np.isfinite(found) & (found > 0.0)]
     least = float(np.quantile(found, LEAST_SHARE)) if len(found) else 1.0

@@ -7,18 +7,19 @@ from collections.abc import Generator
 import pytest
 import viser
 from desk import Desk
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 
 from explorer.app.features.feature import Services
+from explorer.app.features.optimise.runner import SEARCH
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.server import Running, start
 from explorer.app.state.state import open_state
 from explorer.app.state.view import View
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.buttons import Buttons
+from explorer.jobs.jobs import Jobs
 from explorer.mechanism.design_file import PRESETS
 from explorer.page.browser.viser_server import start_viser, stop_viser
-from explorer.page.session.worker import Worker
 
 
 @pytest.fixture(scope="module")
@@ -44,21 +45,21 @@ def desk() -> Generator[Desk]:
 
 
 @pytest.fixture
-def worker() -> Generator[StubWorker]:
-    made = StubWorker()
+def jobs() -> Generator[StubJobs]:
+    made = StubJobs()
     yield made
     made.stop()
 
 
 @pytest.fixture(scope="module")
-def idle_workers() -> Generator[None]:
-    """Give pages a worker that starts no process and computes nothing."""
+def idle_jobs() -> Generator[None]:
+    """Give pages jobs that compute nothing but searches."""
 
-    def make_worker(*_: object, **__: object) -> StubWorker:
-        return StubWorker()
+    def make_jobs(*_: object, **__: object) -> StubJobs:
+        return StubJobs(real=(SEARCH,))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("explorer.app.page.Worker", make_worker)
+        patch.setattr("explorer.app.page.Jobs", make_jobs)
         yield
 
 
@@ -75,8 +76,8 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
 
 @pytest.fixture
 def services(
-    server: viser.ViserServer, desk: Desk, worker: Worker, buttons: Buttons
+    server: viser.ViserServer, desk: Desk, jobs: Jobs, buttons: Buttons
 ) -> Generator[Services]:
-    made = services_for(server, desk.session, worker, buttons=buttons, complain=desk.complain)
+    made = services_for(server, desk.session, jobs, buttons=buttons, complain=desk.complain)
     yield made
     made.stop()

@@ -14,7 +14,10 @@ from explorer.app.session.session import Session, Who
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.downloads import Downloads, File
-from explorer.page.session.worker import Worker
+from explorer.errors import ExplorerError
+from explorer.jobs.executor import LongJob
+from explorer.jobs.jobs import PAGE, Jobs
+from explorer.jobs.process import Call
 from explorer.page.widgets.palette import Commands
 
 
@@ -23,47 +26,66 @@ def _ignore(message: str, who: Who) -> None:
 
 
 class StubOrder(NamedTuple):
-    """An order of a `StubWorker`: its key, task and first argument, and how it is answered."""
+    """An order of `StubJobs`: its key, task and arguments, and how it is answered."""
 
     key: object
     task: Callable[..., Any]
-    request: Any
+    arguments: tuple[Any, ...]
     done: Callable[[Any], None]
     failed: Callable[[str], None]
 
+    @property
+    def request(self) -> Any:
+        """The first argument."""
+        return self.arguments[0]
 
-class StubWorker(Worker):
-    """A worker that starts no process: it keeps its orders and executes them in `work`.
+
+class StubJobs(Jobs):
+    """Jobs that start no process: they keep their orders and execute them in `work`.
 
     Args:
-        at_once: Whether an order is executed when it is submitted.
+        at_once: Whether an order is executed when it is given.
+        real: Names of processes that are started all the same.
     """
 
-    def __init__(self, *, at_once: bool = False) -> None:
+    def __init__(self, *, at_once: bool = False, real: tuple[str, ...] = ()) -> None:
         super().__init__(lambda _: None)
+        self._real = real
         self.orders: list[StubOrder] = []
         self._at_once = at_once
         self._waiting: list[Callable[[], None]] = []
 
-    def submit(
+    def start(
         self,
-        key: object,
         task: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any], None],
         failed: Callable[[str], None],
         receive: Callable[[Any], None] | None = None,
-    ) -> int:
-        del receive
-        self.orders.append(StubOrder(key, task, arguments[0], done, failed))
-        # Arguments and results cross the border of a process.
-        self._waiting.append(lambda: done(_sent(task(*_sent(arguments)))))
+        *,
+        key: object = None,
+        process: str = PAGE,
+        died: str | None = None,
+    ) -> LongJob:
+        if process in self._real:
+            return super().start(
+                task, arguments, done, failed, receive, key=key, process=process, died=died
+            )
+        self.orders.append(StubOrder(key, task, arguments, done, failed))
+
+        def execute() -> None:
+            try:
+                # Arguments and results cross the border of a process.
+                result = _sent(task(*_sent(arguments)))
+            except ExplorerError as error:
+                failed(str(error))
+            else:
+                done(result)
+
+        self._waiting.append(execute)
         if self._at_once:
             self.work()
-        return len(self.orders)
-
-    def cancel(self, number: int, patience: float | None = None, *, after: float = 0.0) -> None:
-        """Leave an order as it is."""
+        return LongJob(Call(task, arguments, {}, is_sending=False))
 
     def work(self) -> None:
         """Execute the orders that wait."""
@@ -79,8 +101,8 @@ class StubDownloads(Downloads):
 
     data = b""
 
-    def __init__(self, server: viser.ViserServer, worker: Worker) -> None:
-        super().__init__(server, worker, _ignore)
+    def __init__(self, server: viser.ViserServer, jobs: Jobs) -> None:
+        super().__init__(server, jobs, _ignore)
         self.sent: list[tuple[Who, str]] = []
 
     def send(self, who: Who, name: str, data: bytes) -> None:
@@ -110,7 +132,7 @@ def _paint_nothing(*_: object) -> None:
 def services_for(
     server: viser.ViserServer | None = None,
     session: Session | None = None,
-    worker: Worker | None = None,
+    jobs: Jobs | None = None,
     *,
     buttons: Buttons | None = None,
     complain: Callable[[str, Who], None] = _ignore,
@@ -124,7 +146,7 @@ def services_for(
     Args:
         server: On which everything is drawn.
         session: To which changes are posted.
-        worker: Which computes; one that keeps its orders if None.
+        jobs: Which compute; jobs that keep their orders if None.
         buttons: The buttons in markup.
         complain: Called with a message for people and the client it is for.
         tell: Called with a message for everybody.
@@ -132,7 +154,7 @@ def services_for(
         user_data: The user's designs and session.
         declared: The features of the page.
     """
-    working = StubWorker() if worker is None else worker
+    working = StubJobs() if jobs is None else jobs
     some_server: Any = server
     some_session: Any = SimpleNamespace(redraw=redraw) if session is None else session
     missing: Any = None
@@ -141,7 +163,7 @@ def services_for(
     return Services(
         server=some_server,
         session=some_session,
-        worker=working,
+        jobs=working,
         buttons=no_buttons if buttons is None else buttons,
         downloads=StubDownloads(some_server, working),
         complain=complain,

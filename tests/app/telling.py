@@ -7,7 +7,7 @@ import os
 import time
 
 from explorer.errors import InputError
-from explorer.page.session.worker import Channel
+from explorer.jobs.process import Channel
 
 # Seconds between two values.
 PAUSE = 0.002

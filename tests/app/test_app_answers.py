@@ -40,7 +40,8 @@ from explorer.mechanism.design_file import typical_machine
 from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.carried_region import carried_region
-from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import node_count_of, workspace_volume
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -151,7 +152,7 @@ def test_drawing_holds_its_workspace_and_the_panel_tells_its_numbers(state: Stat
     volume = workspace_volume(design, rotation).volume
     assert drawing.volume == measured.measured.volume == volume
     assert drawing.nodes is not None
-    assert drawing.nodes.count == workspace_nodes(design, rotation).count
+    assert drawing.nodes.count == node_count_of(Workspace(design, rotation)).count
     feed, cubic = services.get(WORKSPACE_FEED), state.unit_of(3)
     told = plain(words.drawing_words(frame, feed) + words.workspace_details(frame, feed))
     expected = volume
@@ -165,8 +166,7 @@ def test_drawing_holds_its_workspace_and_the_panel_tells_its_numbers(state: Stat
         for block in clearances.workspace_clearances(accessible.pairs, design, state.unit):
             assert plain(content_of(block, {})) in told
     elif request.region == "held":
-        assert request.load is not None
-        expected = carried_region(request.design, rotation, request.load).held_volume
+        expected = carried_region(Workspace(request.design, rotation), request.load).held_volume
     if request.region != "limits":
         assert drawing.part is not None
         assert drawing.part.volume == pytest.approx(expected, rel=5e-3)

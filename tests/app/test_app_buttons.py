@@ -9,7 +9,7 @@ import time
 from collections.abc import Generator
 from contextlib import closing
 from html import escape
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -36,6 +36,7 @@ from explorer.app.state.moves import SetJoint, SetPosition
 from explorer.app.widgets.buttons import Buttons, extra_button, press_button
 from explorer.files.extras import EXTRAS, LINUX_ALONE, install_command
 from explorer.files.packaged import SOURCES
+from explorer.measures.blocks.block import Look
 from explorer.mechanism.design_file import PRESETS
 from explorer.page import look
 from explorer.page.browser import viser_gaps
@@ -43,7 +44,7 @@ from explorer.page.browser.viser_gaps import PLACE
 from explorer.page.widgets import assigning
 from explorer.page.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 
-pytestmark = pytest.mark.usefixtures("idle_workers")
+pytestmark = pytest.mark.usefixtures("idle_jobs")
 
 FILLED = "is-main"
 ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=10_000)
@@ -154,14 +155,18 @@ def test_button_in_markup_is_escaped() -> None:
     assert 'data-value="&quot;&lt;b&gt;" title="&quot;Open&quot;" aria-label="&quot;Open"' in html
 
 
-def test_every_class_of_the_markup_has_a_rule() -> None:
-    rooms = (SOURCES / "explorer" / room for room in ("page", "app"))
-    sources = "".join(path.read_text("utf-8") for room in rooms for path in room.rglob("*.py"))
-    used = set(re.findall(r"\bex-[a-z]+\b", sources))
+def test_every_class_of_the_markup_has_a_rule_and_every_rule_a_class() -> None:
+    rooms = [SOURCES / "explorer" / room for room in ("page", "app")]
+    paths = [path for room in rooms for path in room.rglob("*") if path.suffix in (".py", ".js")]
+    sources = "".join(path.read_text("utf-8") for path in paths)
+    used = set(re.findall(r"\b(?<!data-)ex-[a-z]+(?:-[a-z]+)*\b", sources))
     sheet = look.read_file("page.css")
-    ruled = set(re.findall(r"\.(ex-[a-z]+)", sheet))
-    variables = set(re.findall(r"--(ex-[a-z]+)", sheet))
-    assert used <= ruled | variables
+    ruled = set(re.findall(r"\.(ex-[a-z]+(?:-[a-z]+)*)", sheet))
+    variables = set(re.findall(r"--(ex-[a-z]+(?:-[a-z]+)*)", sheet))
+    looks = {f"ex-{each}" for each in get_args(Look)}
+    start = set(re.findall(r"\.(ex-[a-z]+)", look.read_file("start.css")))
+    assert used <= ruled | variables | start
+    assert ruled <= used | looks
 
 
 def filled_in(container: Any) -> list[str]:

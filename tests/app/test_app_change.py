@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import viser
 from desk import Desk
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 
 from explorer.app.features.history.feature import OVER, ChangeScene, DesignChange
 from explorer.app.features.workspace.feeds import VOLUME_FEED
@@ -34,8 +34,8 @@ class Watcher:
 
     def __init__(self, server: viser.ViserServer, buttons: Buttons, desk: Desk) -> None:
         self.desk = desk
-        worker = StubWorker(at_once=True)
-        services = services_for(server, desk.session, worker, buttons=buttons)
+        jobs = StubJobs(at_once=True)
+        services = services_for(server, desk.session, jobs, buttons=buttons)
         self._volumes = services.get(VOLUME_FEED)
         self.change = services.get(DesignChange)
         self.card = self.change.card

@@ -14,7 +14,7 @@ import viser
 from desk import Desk, number
 from hypothesis import given, strategies as st
 from limited_designs import scaled_design
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 
 from explorer.app.features.compare.feature import ComparePanel, Pin, Unpin
 from explorer.app.features.compare.scene import APART, SCENES
@@ -60,7 +60,8 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import Unit
 from explorer.page.widgets.assigning import Assigner
 from explorer.statics.loaded import LoadedPose
-from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import node_count_of, workspace_volume
+from explorer.workspace.workspace import Workspace
 
 INITIAL, OPTIMAL = PRESETS.values()
 LISTED = measures_in("compare")
@@ -149,7 +150,7 @@ def test_table_shows_the_values_of_the_library(*, millimetres: bool) -> None:
     large = 1e-3 if millimetres else 1.0
     for place, design in enumerate((OPTIMAL, small, variant(3))):
         factor = design.unit_mm / (1.0 if millimetres else OPTIMAL.unit_mm)
-        nodes = workspace_nodes(design)
+        nodes = node_count_of(Workspace(design))
         expected = {
             f"volume {cubic}": large * workspace_volume(design).volume * factor**3,
             "nodes": nodes.count,
@@ -300,16 +301,16 @@ def follow(feeds: list[CompareFeed], state: State) -> None:
 
 
 def test_change_of_the_live_design_requests_its_drawing_alone(
-    feeds: list[CompareFeed], worker: StubWorker
+    feeds: list[CompareFeed], jobs: StubJobs
 ) -> None:
     follow(feeds, open_state(OPTIMAL))
-    assert worker.orders == []
+    assert jobs.orders == []
     state = compared(INITIAL, variant(2), look=Look(overlay=True))
     follow(feeds, state)
     designs = [without_name(each) for each in (OPTIMAL, INITIAL, variant(2))]
-    assert [order.request.design for order in worker.orders] == designs
-    assert len({order.key for order in worker.orders}) == 3
-    worker.work()
+    assert [order.request.design for order in jobs.orders] == designs
+    assert len({order.key for order in jobs.orders}) == 3
+    jobs.work()
     assert all(feed.is_settled for feed in feeds)
     found = columns_of(state, feeds)
     assert [(each.letter, each.measured) for each in found] == [
@@ -317,7 +318,7 @@ def test_change_of_the_live_design_requests_its_drawing_alone(
         for letter, design in zip(("live", "A", "B"), designs, strict=True)
     ]
     follow(feeds, SetVariable("b2", 2.3).apply(state))
-    (order,) = worker.orders[3:]
+    (order,) = jobs.orders[3:]
     assert order.request.design == without_name(OPTIMAL.with_variable("b2", 2.3))
     # Until it comes the last one is shown, and said to be old.
     assert drawing_in(LIVE, feeds[LIVE]) is not None
@@ -326,27 +327,27 @@ def test_change_of_the_live_design_requests_its_drawing_alone(
 
 
 def test_place_with_another_design_shows_nothing_of_the_one_before(
-    feeds: list[CompareFeed], worker: StubWorker
+    feeds: list[CompareFeed], jobs: StubJobs
 ) -> None:
     state = compared(INITIAL)
     follow(feeds, state)
-    worker.work()
+    jobs.work()
     assert drawing_in(1, feeds[1]) is not None
     follow(feeds, Pin(variant(2)).apply(Unpin(0).apply(state)))
     assert drawing_in(1, feeds[1]) is None
-    worker.work()
+    jobs.work()
     assert drawing_in(1, feeds[1]) is not None
 
 
 def test_workspaces_are_drawn_to_true_size_in_their_colours(
-    services: Services, feeds: list[CompareFeed], worker: StubWorker
+    services: Services, feeds: list[CompareFeed], jobs: StubJobs
 ) -> None:
     large = msgspec.structs.replace(INITIAL, unit_mm=25.0)
     state = compared(large, look=Look(overlay=True, outlines=True))
     follow(feeds, state)
     scenes = [services.get(part) for part in SCENES]
     assigner = Assigner(services.server)
-    worker.work()
+    jobs.work()
     follow(feeds, state)
     placed = Placed(Frame(state))
     assigner.assign(update for scene in scenes for update in scene.updates(placed))

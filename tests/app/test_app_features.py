@@ -60,7 +60,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Update
 from explorer.page.widgets.palette import PALETTE_KEY, Command, Key, Palette
 
-pytestmark = pytest.mark.usefixtures("idle_workers")
+pytestmark = pytest.mark.usefixtures("idle_jobs")
 
 OPTIMAL = PRESETS["paper-optimal"]
 

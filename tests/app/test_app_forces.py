@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import viser
 from desk import Desk, by_name
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 
 from explorer import Actuators, Guide, Payload, Struts, Tolerances, Tool
 from explorer.app.features.feature import Services
@@ -48,7 +48,7 @@ from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView, PrecisionView
 from explorer.app.widgets.blocks import render, share_colour
 from explorer.app.widgets.buttons import Buttons
-from explorer.errors import InputError, NoAnswerError
+from explorer.errors import InputError
 from explorer.export.tables import TOLERANCE_COLUMNS
 from explorer.measures.blocks.block import Share
 from explorer.measures.blocks.precision import tolerance_budget
@@ -107,8 +107,8 @@ def test_bar_names_the_largest_share_and_its_part(force: Triple, z: float, look:
 
 
 def test_weights_are_those_that_are_chosen() -> None:
-    worker = StubWorker()
-    services = services_for(worker=worker)
+    jobs = StubJobs()
+    services = services_for(jobs=jobs)
     loads = services.get(Loads)
     none, payload = (
         loads.of(Frame(loaded_state(force=(0.0, 0.0, 0.0), weighed=each))).reactions.actuators
@@ -120,7 +120,7 @@ def test_weights_are_those_that_are_chosen() -> None:
     services.get(WEIGHTS_FEED).follow(frame)
     # Until the parts have masses, the payload alone counts.
     assert loads.of(frame).own is None
-    worker.work()
+    jobs.work()
     own = loads.of(frame).own
     assert own is not None
     assert min(own.arrays[1][:, ROD]) > 0.0
@@ -130,8 +130,8 @@ def test_weights_are_those_that_are_chosen() -> None:
 def test_nearest_position_that_holds_the_load_is_searched_and_gone_to(
     server: viser.ViserServer, buttons: Buttons, desk: Desk
 ) -> None:
-    worker = StubWorker()
-    services = services_for(server, desk.session, worker, buttons=buttons)
+    jobs = StubJobs()
+    services = services_for(server, desk.session, jobs, buttons=buttons)
     panel, feed = ForcesPanel(services), services.get(nearest_feed)
     show_in(desk, loaded_state())
     feed.follow(Frame(desk.state))
@@ -140,7 +140,7 @@ def test_nearest_position_that_holds_the_load_is_searched_and_gone_to(
     frame = Frame(desk.state)
     feed.follow(frame)
     assert "searching" in markup(panel, frame.state)
-    worker.work()
+    jobs.work()
     drawing = feed.drawing
     assert drawing is not None
     assert drawing.pose is not None
@@ -275,10 +275,10 @@ def words(html: str) -> str:
 
 
 @pytest.fixture
-def worker() -> Generator[StubWorker]:
-    worker = StubWorker(at_once=True)
-    yield worker
-    worker.stop()
+def jobs() -> Generator[StubJobs]:
+    jobs = StubJobs(at_once=True)
+    yield jobs
+    jobs.stop()
 
 
 def show_in(desk: Desk, state: State) -> None:
@@ -424,13 +424,11 @@ def test_budget_that_cannot_be_kept_is_reported_in_one_line(
     server: viser.ViserServer, desk: Desk
 ) -> None:
     show_in(desk, state_with(budget=True, wanted=0.01, keep_actuators=True))
-    worker, buttons = StubWorker(), Buttons(server)
-    services = services_for(server, desk.session, worker, buttons=buttons)
+    jobs, buttons = StubJobs(), Buttons(server)
+    services = services_for(server, desk.session, jobs, buttons=buttons)
     part, before = PrecisionPanel(services), desk.state
     services.get(BUDGET_FEED).follow(Frame(before))
-    with pytest.raises(NoAnswerError) as error:
-        worker.work()
-    worker.orders[-1].failed(str(error.value))
+    jobs.work()
     text = words(markup(part, before))
     assert "There is no budget" in text
     assert "actuators" in text

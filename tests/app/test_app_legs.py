@@ -16,7 +16,7 @@ import trimesh
 import viser
 from desk import Desk, by_name, number, random_states, rows_of as rows_below_head, thick, viewed
 from hypothesis import given, strategies as st
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 
 from explorer.app.features.feature import Feed, Services
 from explorer.app.features.legs.feature import (
@@ -60,7 +60,8 @@ from explorer.singularity.colours import OUTLINE, TUBE
 from explorer.workspace.accessible.nodes import StartError, check_start
 from explorer.workspace.accessible.radii import RadiusCurve
 from explorer.workspace.least_clearance import least_clearances
-from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.constraints import slacks
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -99,14 +100,14 @@ def beyond_its_limits() -> State:
 
 def follow(
     state: State, kind: Callable[[Services], Followed], services: Services | None = None
-) -> tuple[Followed, StubWorker]:
-    """Return the feed of a class, which has drawn a state, and its worker."""
+) -> tuple[Followed, StubJobs]:
+    """Return the feed of a class, which has drawn a state, and its jobs."""
     services = services or services_for()
-    feed, worker = services.get(kind), services.worker
-    assert isinstance(worker, StubWorker)
+    feed, jobs = services.get(kind), services.jobs
+    assert isinstance(jobs, StubJobs)
     feed.follow(Frame(state))
-    answer(worker)
-    return feed, worker
+    answer(jobs)
+    return feed, jobs
 
 
 @cache
@@ -115,9 +116,9 @@ def execute(task: Callable[[Any], Any], request: object) -> Any:
     return task(request)
 
 
-def answer(worker: StubWorker) -> None:
+def answer(jobs: StubJobs) -> None:
     """Answer the newest order, if there is any."""
-    for order in worker.orders[-1:]:
+    for order in jobs.orders[-1:]:
         order.done(execute(order.task, order.request))
 
 
@@ -151,7 +152,7 @@ def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
     assert float(np.median(off)) < 1e-6
     assert float(np.quantile(off, 0.98)) < 0.1
     plain = shells[PLAIN].vertices[shells[PLAIN].faces].mean(axis=1)
-    limits = constraints(THICK.design, THICK.pose.rotation)
+    limits = Workspace(THICK.design, THICK.pose.rotation).limits
     on_limits = np.abs(slacks(limits, plain)).min(axis=-1)
     assert float(on_limits.max()) < 2.0 * work.PART_TOLERANCE * OPTIMAL.reach
     whole = drawing_of(show(THICK, region="limits"))
@@ -172,7 +173,7 @@ def test_cut_takes_one_side_and_maps_the_accessible_part(axis: int) -> None:
     points = np.full((3000, 3), level)
     flat = np.random.default_rng(axis).uniform(lows, highs, (len(points), 2))
     points[:, [first, second]] = flat
-    limits = constraints(THICK.design, THICK.pose.rotation)
+    limits = Workspace(THICK.design, THICK.pose.rotation).limits
     within = np.asarray((slacks(limits, points) >= 0.2).all(axis=-1))
     blocked = inside(path_points(drawing.slice_map, "is-blocked"), flat)[within]
     colliding = inside(path_points(drawing.slice_map, "is-colliding"), flat)[within]
@@ -230,25 +231,25 @@ def test_move_requests_a_drawing_only_if_paths_start_at_the_pose(
     state = show(THICK, start=start, region=region)
     for each in (state, SetPosition(2, 8.0).apply(state)):
         services.get(WORKSPACE_FEED).follow(Frame(each))
-    assert isinstance(services.worker, StubWorker)
-    assert len(services.worker.orders) == orders
+    assert isinstance(services.jobs, StubJobs)
+    assert len(services.jobs.orders) == orders
 
 
 def test_failure_of_an_older_request_is_no_problem() -> None:
-    feed, worker = follow(THICK, WORKSPACE_FEED)
+    feed, jobs = follow(THICK, WORKSPACE_FEED)
     feed.follow(Frame(show(THICK, colour="margin")))
-    first, second = worker.orders
+    first, second = jobs.orders
     first.failed("too late")
     assert feed.problem is None
     second.failed("it failed")
     assert feed.problem == "it failed"
-    answer(worker)
+    answer(jobs)
     assert feed.problem is None
     assert feed.is_current
 
 
 def test_curve_is_requested_once_for_all_radii() -> None:
-    feed, worker = follow(open_state(OPTIMAL), RADIUS_FEED)
+    feed, jobs = follow(open_state(OPTIMAL), RADIUS_FEED)
     state = show_curve(open_state(OPTIMAL))
     narrow = with_limits(state, margin=1.0)
     for each, orders in (
@@ -260,8 +261,8 @@ def test_curve_is_requested_once_for_all_radii() -> None:
         (open_state(OPTIMAL), 2),
     ):
         feed.follow(Frame(each))
-        assert len(worker.orders) == orders
-    assert worker.orders[-1].request.design.limits.margin == 1.0
+        assert len(jobs.orders) == orders
+    assert jobs.orders[-1].request.design.limits.margin == 1.0
 
 
 def summary(state: State) -> str:
@@ -278,11 +279,11 @@ def test_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
     assert drawing.part is None
     assert trouble is not None
     with pytest.raises(StartError) as refused:
-        check_start(state.design, state.pose.rotation, home)
+        check_start(Workspace(state.design, state.pose.rotation), home)
     assert trouble.reason == refused.value.in_millimetres
     assert "l4 = 130.1 mm is above its maximum 125 mm" in trouble.reason
     assert trouble.nearest is not None
-    check_start(state.design, state.pose.rotation, np.array(trouble.nearest))
+    check_start(Workspace(state.design, state.pose.rotation), np.array(trouble.nearest))
     assert drawing.mesh_volume == pytest.approx(whole.mesh_volume, rel=1e-4)
     assert nothing_words(drawing) == "Nothing is accessible from the home position"
     # The alert of the panel has these words.
@@ -295,7 +296,7 @@ def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
     panel, before = WorkspacePanel(services), show(beyond_its_limits())
     desk.session.do(Set("design", before.design))
     desk.session.do(Set("view", before.view))
-    feed, worker = follow(before, WORKSPACE_FEED, services)
+    feed, jobs = follow(before, WORKSPACE_FEED, services)
     words = [str(value) for *_, value in panel.updates(Frame(before))]
     (alert,) = (text for text in words if "Nothing is accessible from the home position" in text)
     assert "Go there" in alert
@@ -310,7 +311,7 @@ def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
     assert after.view.workspace == replace(before.view.workspace, start="pose")
     assert after.design == before.design
     feed.follow(Frame(after))
-    answer(worker)
+    answer(jobs)
     assert feed.drawing is not None
     assert feed.drawing.part is not None
     assert not any("Go there" in str(value) for *_, value in panel.updates(Frame(after)))
@@ -395,13 +396,13 @@ def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
     assert number(rows[1][1]) == pytest.approx(OPTIMAL.unit_mm * expected.radius_at(0.99), rel=5e-3)
     assert rows[2][1] == "0"
     assert "touch within the limits, where z = 0: legs 1 and 4 at (0, 0, 0) mm" in html
-    least = least_clearances(OPTIMAL)
+    least = least_clearances(Workspace(OPTIMAL))
     for pair in (PAIRS.index((2, 4)), PAIRS.index((3, 4))):
         x, y = (format_number(OPTIMAL.unit_mm * float(v), 3) for v in least.position[pair, :2])
         assert f"legs {PAIRS[pair][0]} and {PAIRS[pair][1]} at ({x}, {y}, 0) mm" in html
 
 
-def test_chart_appears_once_its_curve_is_computed(services: Services, worker: StubWorker) -> None:
+def test_chart_appears_once_its_curve_is_computed(services: Services, jobs: StubJobs) -> None:
     panel, feed = ClearancePanel(services), services.get(RADIUS_FEED)
     state = show_curve(open_state(OPTIMAL))
 
@@ -412,7 +413,7 @@ def test_chart_appears_once_its_curve_is_computed(services: Services, worker: St
 
     assert chart(open_state(OPTIMAL)) == chart(state) == {"visible": False}
     assert "Computing" in radius_words(Frame(state), feed)
-    answer(worker)
+    answer(jobs)
     drawn = chart(state)
     assert drawn["visible"] is True
     radii, *volumes = chart_columns(curve_of(state), 0.0)
@@ -424,7 +425,7 @@ def test_chart_appears_once_its_curve_is_computed(services: Services, worker: St
     narrow = with_limits(state, margin=1.0)
     assert chart(narrow)["visible"] is True
     assert "computing" in radius_words(Frame(narrow), feed)
-    answer(worker)
+    answer(jobs)
     assert "computing" not in radius_words(Frame(narrow), feed)
 
 

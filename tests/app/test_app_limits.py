@@ -22,12 +22,13 @@ from explorer.app.features.sharing.reporting import make_report
 from explorer.app.state.actions import Open
 from explorer.app.state.frame import Frame
 from explorer.numerics.number_text import UNITS
-from explorer.workspace.limits.constraints import angle_between, constraints
+from explorer.workspace.limits.constraints import angle_between
 from explorer.workspace.limits.quantities import ANGLE, Bound, Demand
 from explorer.workspace.limits.table import LIMITS, Entry, Limit, LimitCase, angle_from_home
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import poses_are_valid
 from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 NAME, HALF_ANGLE = "lean of leg 4", 12.0
@@ -94,7 +95,7 @@ def test_limit_added_to_the_table_is_kept_by_poses_moves_and_solids(leaning: Des
     for share in np.linspace(0.0, 1.0, 30):
         along = (1.0 - share) * ends[0] + share * ends[2]
         assert (leans(along)[moves_are_valid(leaning, *ends)] < HALF_ANGLE + 0.01).all()
-    assert NAME in [limit.name for limit in constraints(leaning, home.rotation)]
+    assert NAME in [limit.name for limit in Workspace(leaning, home.rotation).limits]
     solid, whole = (workspace_solid(each, home.rotation) for each in (leaning, free))
     assert NAME in solid.limits
     assert solid.volume < 0.9 * whole.volume

@@ -12,7 +12,7 @@ from unittest.mock import Mock
 
 import pytest
 from client import Client, client_of, press_update, presses_in, wait_for
-from services import StubWorker
+from services import StubJobs
 
 from explorer.app.features.designs.feature import UNSAVED
 from explorer.app.features.sharing.feature import send_picture
@@ -123,26 +123,26 @@ def encoded(what: str) -> bytes:
 
 
 @pytest.fixture
-def files(worker: StubWorker) -> Downloads:
+def files(jobs: StubJobs) -> Downloads:
     server: Any = SimpleNamespace(get_clients=lambda: {1: Mock(), 2: Mock()})
-    return Downloads(server, worker, lambda message, who: pytest.fail(f"{who}: {message}"))
+    return Downloads(server, jobs, lambda message, who: pytest.fail(f"{who}: {message}"))
 
 
 def test_only_a_file_of_the_same_name_and_browser_without_a_notice_is_replaced(
-    files: Downloads, worker: StubWorker
+    files: Downloads, jobs: StubJobs
 ) -> None:
     for who, name in ((1, "workspace.3mf"), (1, "hull.3mf"), (2, "hull.3mf"), (1, "hull.3mf")):
         files.compute(who, name, encoded, (name,))
-    workspace, hull, of_another, again = (order.key for order in worker.orders)
+    workspace, hull, of_another, again = (order.key for order in jobs.orders)
     assert hull == again
     assert len({workspace, hull, of_another}) == 3
     for _ in range(2):
         files.compute(1, "report.pdf", encoded, ("report",), ("Report", "A moment."))
-    first, second = (order.key for order in worker.orders[4:])
-    assert first != second
+    # What has no key is never replaced.
+    assert [order.key for order in jobs.orders[4:]] == [None, None]
     # For a browser that is gone none is made.
     files.compute(7, "hull.3mf", encoded, ("hull",))
-    assert len(worker.orders) == 6
+    assert len(jobs.orders) == 6
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_only_a_file_of_the_same_name_and_browser_without_a_notice_is_replaced(
 def test_file_of_any_design_has_a_name_that_shows(design: str, file: str) -> None:
     client = Mock()
     server: Any = SimpleNamespace(get_clients=lambda: {1: client})
-    Downloads(server, StubWorker(), Mock()).send(1, f"{design}.json", b"")
+    Downloads(server, StubJobs(), Mock()).send(1, f"{design}.json", b"")
     assert client.send_file_download.call_args.args[0] == file
 
 

@@ -81,6 +81,8 @@ from explorer.app.state.view import View
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
+from explorer.jobs.jobs import Jobs
+from explorer.jobs.process import Channel
 from explorer.measures.box import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
@@ -89,10 +91,10 @@ from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate, compare_designs, curves_of
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
 from explorer.optimise.search.sqp import Trail
-from explorer.page.session.worker import Channel
-from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.constraints import slacks
 from explorer.workspace.limits.table import GAP
 from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -196,9 +198,8 @@ class Bench(Desk):
         self.states: list[State] = []
         self.markup: list[object] = []
         super().__init__(open_state(OPTIMAL))
-        self.services = services_for(
-            server, self.session, buttons=Buttons(server), tell=self.reports.append
-        )
+        self.jobs = Jobs(self.reports.append)
+        self.services = services_for(server, self.session, self.jobs, buttons=Buttons(server))
         self.optimiser = self.services.get(Optimiser)
         self.panel = OptimisePanel(self.services)
 
@@ -219,7 +220,7 @@ class Bench(Desk):
         self.do(Open(paper_start()), SetRequest("optimisation.request", request))
         self.push(START)
         self.wait(lambda s: Optimisation.of(s).is_on and len(run_of(s).iterates) >= iterates)
-        process = self.optimiser.worker.process_id
+        process = self.jobs.process_id(optimiser.SEARCH)
         assert process is not None
         return process
 
@@ -235,7 +236,8 @@ def bench(server: viser.ViserServer) -> Iterator[Bench]:
         yield bench
         bench.services.buttons.stop()
         bench.session.stop()
-        bench.optimiser.stop()
+        bench.services.stop()
+        bench.jobs.stop()
 
 
 def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
@@ -467,7 +469,7 @@ def test_suggested_values_suit_the_design(name: str) -> None:
     assert (lows < home.position).all()
     assert (home.position < highs).all()
     for corner in corners_of(box):
-        assert slacks(constraints(design, home.rotation), corner).min() >= 0.0
+        assert slacks(Workspace(design, home.rotation).limits, corner).min() >= 0.0
 
 
 @pytest.mark.parametrize("name", PRESETS)

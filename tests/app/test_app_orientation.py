@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.orientation import maps, work
@@ -66,10 +66,10 @@ def tilts() -> Generator[work.TiltsDrawing]:
     """The tilts over the workspace at fewer nodes than the page has."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(work, "NODES", 8)
-        services, worker = services_and_worker()
+        services, jobs = services_and_worker()
         feed = services.get(work.TILTS_FEED)
         feed.follow(Frame(show(open_state(OPTIMAL), tilts=True)))
-        worker.work()
+        jobs.work()
         assert feed.drawing is not None
         yield feed.drawing
 
@@ -79,10 +79,10 @@ def by_torsion() -> TiltByTorsion:
     return tilt_by_torsion(OPTIMAL, (10.0, 5.0, 9.0))
 
 
-def services_and_worker() -> tuple[Services, StubWorker]:
+def services_and_worker() -> tuple[Services, StubJobs]:
     services = services_for()
-    assert isinstance(services.worker, StubWorker)
-    return services, services.worker
+    assert isinstance(services.jobs, StubJobs)
+    return services, services.jobs
 
 
 def test_angles_that_are_set_are_those_of_the_pose() -> None:
@@ -168,13 +168,13 @@ def test_map_without_any_tilt_is_drawn_too() -> None:
 
 
 def test_position_feed_computes_share_and_torsions() -> None:
-    services, worker = services_and_worker()
+    services, jobs = services_and_worker()
     state = open_state(OPTIMAL)
     for kind in ORIENTATION.later_feeds:
         services.get(kind).follow(Frame(state))
-    worker.work()
+    jobs.work()
     # Nothing else is shown.
-    assert [order.task.__name__ for order in worker.orders] == ["orientations_at"]
+    assert [order.task.__name__ for order in jobs.orders] == ["orientations_at"]
     drawing = services.get(work.POSITION_FEED).drawing
     assert drawing is not None
     assert drawing.share == orientation_share(OPTIMAL, state.pose.position)
@@ -198,10 +198,10 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
         ("total", total_solid, "at most "),
         ("inclusive", inclusive_solid, "at least "),
     ):
-        services, worker = services_and_worker()
+        services, jobs = services_and_worker()
         feed = services.get(work.RANGE_FEED)
         feed.follow(Frame(show(open_state(OPTIMAL), over=over, range=15.0)))
-        worker.work()
+        jobs.work()
         assert feed.drawing is not None
         volumes[over] = feed.drawing.solid.volume
         assert volumes[over] == pytest.approx(make(OPTIMAL, rotations).volume, rel=1e-3)
@@ -271,7 +271,7 @@ def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> N
 
 
 def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure() -> None:
-    services, worker = services_and_worker()
+    services, jobs = services_and_worker()
     state, feed = open_state(OPTIMAL), services.get(work.POSITION_FEED)
 
     def text_at(state: State) -> str:
@@ -281,14 +281,14 @@ def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure
 
     assert "…" in text_at(state)
     feed.follow(Frame(state))
-    worker.work()
+    jobs.work()
     assert "is-outdated" not in text_at(state)
     after = SetPosition(2, 12.0).apply(state)
     feed.follow(Frame(after))
     assert text_at(after).count("is-outdated") == 2
-    worker.orders[-1].failed("the worker ended")
+    jobs.orders[-1].failed("the jobs ended")
     failed = text_at(after)
-    assert "the worker ended" in failed
+    assert "the jobs ended" in failed
     assert "…" not in failed
 
 

@@ -18,11 +18,10 @@ import numpy as np
 import pytest
 from desk import Desk
 from page_widgets import widgets
-from services import StubDownloads, StubWorker, services_for
+from services import StubDownloads, StubJobs, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.loads.load import weights_of_parts
-from explorer.app.features.paths import feature
 from explorer.app.features.paths.actions import (
     Advance,
     Go,
@@ -63,6 +62,7 @@ from explorer.app.state.moves import SetPose, SetPosition
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.errors import InputError
+from explorer.jobs.jobs import Jobs
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.folds import to_folds
 from explorer.mechanism.kinematics import forward
@@ -88,7 +88,9 @@ class Bench(Desk):
         self.reports: list[str] = []
         self.times: list[float] = []
         super().__init__(open_state(OPTIMAL))
-        self.runner = PathRunner(services_for(session=self.session, tell=self.reports.append))
+        self.jobs = Jobs(self.reports.append)
+        self.services = services_for(session=self.session, jobs=self.jobs)
+        self.runner = PathRunner(self.services)
 
     def draw(self, frame: Frame) -> None:
         if (journey := journey_of(frame.state)) is not None:
@@ -108,7 +110,8 @@ def bench() -> Generator[Bench]:
     bench = Bench()
     yield bench
     bench.session.stop()
-    bench.runner.stop()
+    bench.services.stop()
+    bench.jobs.stop()
 
 
 def with_ends(state: State, start: End = None, goal: End = None) -> State:
@@ -342,7 +345,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
     positions, rotations = ([p.position for p in inner], [p.rotation for p in inner])
     assert poses_are_valid(state.design, np.array(positions), np.array(rotations)).all()
-    process = bench.runner.worker.process_id
+    process = bench.jobs.process_id("plan")
     assert process not in (None, os.getpid())
     # A plan that would never be ready.
     os.kill(process, signal.SIGSTOP)
@@ -352,7 +355,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     )
     bench.do(CANCEL)
     bench.wait_for_plan(2)
-    assert bench.runner.worker.wait_until_idle(60.0)
+    assert bench.jobs.wait_until_idle(60.0, "plan")
     assert Paths.of(bench.state).problem is None
     # Cancelled before it was begun, it leaves the process.
     with suppress(ProcessLookupError):
@@ -521,9 +524,7 @@ def straight(*more: Action, force: Triple = DOWN) -> State:
 
 
 @pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
-def test_planned_path_holds_load_and_weights_of_the_tab_forces(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_planned_path_holds_load_and_weights_of_the_tab_forces() -> None:
     state = straight(
         Set("view.at", "tool"),
         Set("view.forces.weighed", "payload and legs"),
@@ -531,19 +532,10 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
         force=(0.0, 0.0, -25.0),
     )
     state = Go().apply(Set("paths.kind", "planned").apply(state))
-    orders: list[tuple[Any, ...]] = []
-
-    def use_stub(*_: object, **__: object) -> StubWorker:
-        return StubWorker()
-
-    def submit(_: object, *order: Any) -> None:
-        orders.append(order)
-
-    monkeypatch.setattr(feature, "Worker", use_stub)
-    monkeypatch.setattr(StubWorker, "submit", submit)
-    PathRunner(services_for()).follow(Frame(state))
-    _, task, arguments, *_ = orders[-1]
-    poses = task(*arguments).poses
+    jobs = StubJobs()
+    PathRunner(services_for(jobs=jobs)).follow(Frame(state))
+    (order,) = jobs.orders
+    poses = order.task(*order.arguments).poses
     weights = weights_of_parts((PRESS, 3000.0)).with_payload(PRESS)
     along = path_loads(PRESS, poses, state.load, tool=state.tool, weights=weights)
     assert 0.5 < along.utilisation <= 1.0 + 1e-4

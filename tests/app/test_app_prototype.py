@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 import pytest
 from desk import Desk, by_name, thick, viewed
-from part_gaps import least_gap
-from services import StubWorker, services_for
+from part_gaps import least_gap, vertices_at
+from services import StubJobs, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs
@@ -62,10 +62,10 @@ PARTS = 18
 
 
 @pytest.fixture
-def worker() -> Generator[StubWorker]:
-    worker = StubWorker(at_once=True)
-    yield worker
-    worker.stop()
+def jobs() -> Generator[StubJobs]:
+    jobs = StubJobs(at_once=True)
+    yield jobs
+    jobs.stop()
 
 
 @pytest.fixture
@@ -128,7 +128,7 @@ def test_parts_are_drawn_where_the_library_places_them(
     placed = placed_with_parts(services, state)
     nodes = by_name(PrototypeScene(services).updates(placed))
     assert len(nodes) == PARTS
-    whole = parts.prototype.at(state.pose.position, state.pose.rotation)
+    whole = vertices_at(parts.prototype, state.pose.position, state.pose.rotation)
     for part, (_, faces), corners in zip(parts.prototype.parts, parts.meshes, whole, strict=True):
         path = next(path for path in nodes if path.endswith(f"/{part.name}"))
         seen = in_scene(nodes, path)[faces]
@@ -234,9 +234,9 @@ def test_exploded_parts_of_a_leg_are_free_of_each_other_and_within_the_corners(
 
 
 def test_parts_are_made_again_when_the_design_changes_and_not_else(
-    feed: PartsFeed, worker: StubWorker
+    feed: PartsFeed, jobs: StubJobs
 ) -> None:
-    orders = worker.orders
+    orders = jobs.orders
     feed.follow(Frame(open_state(OPTIMAL)))
     assert orders == []
     for state in (
@@ -276,8 +276,8 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
 
 def test_drawing_of_a_design_of_another_size_is_not_shown() -> None:
     services = services_for()
-    feed, worker = services.get(BUILD_FEED), services.worker
-    assert isinstance(worker, StubWorker)
+    feed, jobs = services.get(BUILD_FEED), services.jobs
+    assert isinstance(jobs, StubJobs)
     larger = msgspec.structs.replace(
         OPTIMAL.with_variables([1e4 * each for each in OPTIMAL.variables]).with_limits(box=None),
         unit_mm=1e-3,
@@ -286,11 +286,11 @@ def test_drawing_of_a_design_of_another_size_is_not_shown() -> None:
     similar = OPTIMAL.with_variable("a3x", 20.0)
     for first, then, stays in ((OPTIMAL, similar, True), (similar, larger, False)):
         feed.follow(Frame(open_state(first)))
-        worker.work()
+        jobs.work()
         assert feed.drawing is not None
         feed.follow(Frame(open_state(then)))
         assert (feed.drawing is not None) == stays
-        worker.work()
+        jobs.work()
         assert feed.is_current
 
 

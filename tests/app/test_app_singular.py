@@ -13,7 +13,7 @@ import pytest
 import server_clock
 from desk import CLIENT, Desk, by_name, number, random_states
 from hypothesis import given
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.feature import Services
@@ -110,7 +110,7 @@ def test_stratum_without_a_nearest_pose_is_refused(lower: tuple[int, ...]) -> No
 
 
 def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
-    services: Services, desk: Desk, worker: StubWorker
+    services: Services, desk: Desk, jobs: StubJobs
 ) -> None:
     panel = StrataPanel(services)
 
@@ -120,7 +120,7 @@ def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
 
     desk.session.do(Set("view.singular.strata", value=False))
     services.get(work.STRATA_FEED).follow(Frame(desk.state))
-    assert worker.orders == []
+    assert jobs.orders == []
     assert len(contents()) == 1
     desk.session.do(Set("view.singular.strata", value=True))
     (html,) = (content for content in contents() if "data-press" in content)

@@ -17,7 +17,7 @@ import pytest
 from client import wait_for
 from desk import Desk
 from hypothesis import given, strategies as st
-from services import StubWorker
+from services import StubJobs
 
 from explorer.app.features.feature import Services
 from explorer.app.features.studies import work
@@ -67,6 +67,8 @@ from explorer.app.state.state import open_state
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.files import extras
+from explorer.jobs.executor import LongJob
+from explorer.jobs.jobs import Jobs
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
@@ -336,15 +338,21 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def feed(home: Path) -> Generator[StudyFeed]:
-    feed = StudyFeed(StudyFolders(home), lambda: None)
-    yield feed
-    feed.stop()
+def jobs() -> Generator[StubJobs]:
+    jobs = StubJobs(at_once=True)
+    yield jobs
+    jobs.stop()
 
 
-def draw_study(feed: StudyFeed, studies: Studies) -> StudyDrawing:
+@pytest.fixture
+def feed(home: Path, jobs: StubJobs) -> StudyFeed:
+    return StudyFeed(StudyFolders(home), jobs, lambda: None)
+
+
+def draw_study(feed: StudyFeed, studies: Studies, jobs: Jobs | None = None) -> StudyDrawing:
+    """Return the drawing of a study, by jobs that start no process if none are given."""
     feed.follow(Frame(with_value(open_state(OPTIMAL), "studies", studies)))
-    assert feed.wait_until_idle(PATIENCE)
+    assert jobs is None or jobs.wait_until_idle(PATIENCE)
     assert feed.problem is None
     assert feed.drawing is not None
     return feed.drawing
@@ -530,10 +538,8 @@ def test_plots_are_not_drawn_again_for_a_live_design_and_a_lost_study_is_reporte
     state = with_value(open_state(OPTIMAL), "studies", studies)
     feed.follow(Frame(SetVariable("b3", 5.0).apply(state)))
     feed.follow(Frame(Set("studies.plan", QUICK).apply(state)))
-    assert feed.wait_until_idle(PATIENCE)
     assert feed.drawing is drawing
     feed.follow(Frame(with_value(open_state(OPTIMAL), "studies", Studies(name="gone"))))
-    assert feed.wait_until_idle(PATIENCE)
     assert feed.problem == "there is no study 'gone'; there are some"
     assert feed.drawing is None
     feed.follow(Frame(open_state(OPTIMAL)))
@@ -635,35 +641,41 @@ def drawing_of(results: Results, seen: PlotRows) -> StudyDrawing:
 class Studio:
     """A desk, its studies and who runs them."""
 
-    def __init__(self, desk: Desk, home: Path) -> None:
+    def __init__(self, desk: Desk, home: Path, jobs: Jobs) -> None:
         self.desk = desk
         self.folders = StudyFolders(home)
-        self.feed = StudyFeed(self.folders, lambda: None)
-        self.runner = StudyRunner(desk.session, self.feed, desk.complain)
+        self.jobs = jobs
+        self.feed = StudyFeed(self.folders, self.jobs, lambda: None)
+        self.runner = StudyRunner(desk.session, self.feed, self.jobs, desk.complain)
+
+    def wait_until_idle(self) -> None:
+        """Wait until no study is computed."""
+        assert self.jobs.wait_until_idle(PATIENCE, "study")
+        assert self.runner.run is None
 
 
 @pytest.fixture
 def studio(desk: Desk, tmp_path: Path) -> Generator[Studio]:
-    studio = Studio(desk, tmp_path / "studies")
+    studio = Studio(desk, tmp_path / "studies", Jobs(lambda _: None))
     yield studio
-    studio.runner.worker.stop()
-    studio.feed.stop()
+    studio.jobs.stop()
 
 
 def test_study_that_is_refused_or_lacks_a_library_leaves_no_entry(
-    studio: Studio, monkeypatch: pytest.MonkeyPatch
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    runner, desk = studio.runner, studio.desk
+    jobs = StubJobs()
+    studio = Studio(desk, tmp_path / "studies", jobs)
+    runner = studio.runner
     # A folder of another study, found only where the rows are to be computed.
     other = studio.folders.home / "paper-optimal-1"
     monkeypatch.setattr(StudyFolders, "new", lambda *_: other)  # pyright: ignore
     other.mkdir(parents=True)
     (other / "notes.txt").write_text("mine")
-    runner.worker = worker = StubWorker()
     runner.start(OPTIMAL, QUICK)
-    with pytest.raises(InputError) as refusal, claim(other, worker.orders[0].request):
+    with pytest.raises(InputError) as refusal, claim(other, jobs.orders[0].request):
         pass
-    worker.orders[0].failed(str(refusal.value))
+    jobs.orders[0].failed(str(refusal.value))
     assert "is not empty" in desk.complaints.pop()
     monkeypatch.setattr(extras, "is_missing", lambda *_: True)  # pyright: ignore
     runner.start(OPTIMAL, QUICK)
@@ -674,12 +686,12 @@ def test_study_that_is_refused_or_lacks_a_library_leaves_no_entry(
 
 
 def test_study_that_is_cancelled_is_told_of_nobody_and_stays_open_to_be_continued(
-    studio: Studio,
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    runner, desk = studio.runner, studio.desk
-    runner.worker = worker = StubWorker()
-    cancelled: list[tuple[int, float | None]] = []
-    worker.cancel = lambda number, patience=None, *, after=0.0: cancelled.append((number, patience))
+    jobs = StubJobs()
+    runner = Studio(desk, tmp_path / "studies", jobs).runner
+    cancelled: list[float] = []
+    monkeypatch.setattr(LongJob, "cancel", lambda _, patience: cancelled.append(patience))  # pyright: ignore
     runner.start(OPTIMAL, QUICK)
     run = runner.run
     assert run is not None
@@ -688,12 +700,12 @@ def test_study_that_is_cancelled_is_told_of_nobody_and_stays_open_to_be_continue
     assert "is being computed" in desk.complaints.pop()
     for _ in range(2):
         runner.cancel()
-    assert cancelled == [(1, work.PATIENCE)]
+    assert cancelled == [work.PATIENCE]
     # Its process may have been ended by force.
-    worker.orders[0].failed(work.DIED)
+    jobs.orders[0].failed(work.DIED)
     assert runner.run is None
     runner.go_on(run.name)
-    first, second = worker.orders
+    first, second = jobs.orders
     assert (second.task, second.request) == (first.task, first.request)
     assert desk.complaints == []
     assert Studies.of(desk.state).name == run.name
@@ -711,10 +723,10 @@ def test_study_whose_process_dies_is_reported_and_keeps_the_rows_it_has(studio: 
     assert run is not None
     # Once there is something to keep.
     wait_for(is_under_way, PATIENCE)
-    number = runner.worker.process_id
+    number = studio.jobs.process_id("study")
     assert number is not None
     os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
-    assert runner.wait_until_idle(PATIENCE)
+    studio.wait_until_idle()
     assert any("Continue the study" in each for each in desk.complaints)
     results = load_results(studio.folders.folder(run.name))
     assert 0 < results.count < 160
@@ -728,7 +740,7 @@ def test_study_whose_process_dies_is_reported_and_keeps_the_rows_it_has(studio: 
         for name, value, live in zip(VARIABLES, design.variables, OPTIMAL.variables, strict=True):
             low, high = results.study.variables.get(name, (live, live))
             assert low <= value <= high
-    assert not draw_study(studio.feed, Studies.of(desk.state)).is_complete
+    assert not draw_study(studio.feed, Studies.of(desk.state), studio.jobs).is_complete
 
 
 def test_study_that_cannot_be_is_refused_and_leaves_nothing(studio: Studio) -> None:
@@ -746,11 +758,9 @@ def test_new_study_closes_the_open_one_and_shows_the_settings(
     services.shared[study_folders] = StudyFolders(home)
     panel = StudiesPanel(services)
     desk.session.do(OpenStudy("some"))
-    draw_study(panel.feed, Studies.of(desk.state))
     # Without a request the settings of a new study are not shown while one is open.
     updates = [*panel.updates(Frame(desk.state))]
     assert [v for h, n, v in updates if h is panel.form and n == "visible"] == [False]
     desk.press(buttons, "studies.new")
     updates = [*panel.updates(Frame(desk.state))]
     assert [v for h, n, v in updates if h is panel.form and n == "visible"] == [True]
-    panel.feed.stop()

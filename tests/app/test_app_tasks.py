@@ -1,4 +1,4 @@
-"""Tasks of the worker that send messages, are cancelled, fail or die with their process."""
+"""Tasks of a process that send messages, are cancelled, fail or die with their process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ import pytest
 from client import wait_for
 
 from explorer.app.server import ALLOCATOR, LOG, start_log
-from explorer.page.session.worker import CANCELLED, DIED_TWICE, RESTARTED, Worker, log_error
+from explorer.jobs.executor import DIED_TWICE, RESTARTED, LongJob, log_error
+from explorer.jobs.jobs import Jobs
+from explorer.jobs.process import CANCELLED
 from tests.app import telling
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,27 +29,28 @@ NEVER, AT_ONCE = 3600.0, 0.001
 
 
 class Requester:
-    """Requests tasks of a worker, and keeps their messages and how they ended, in order."""
+    """Requests tasks of a process, and keeps their messages and how they ended, in order."""
 
-    def __init__(self, worker: Worker) -> None:
-        self._worker = worker
+    job: LongJob
+
+    def __init__(self, jobs: Jobs) -> None:
+        self._jobs = jobs
         self._events: Queue[tuple[str, Any]] = Queue()
-        self.number = -1
 
     def request(
         self,
         task: str,
         *arguments: Any,
-        key: str = "task",
+        key: str | None = "task",
         sends: bool = True,
     ) -> None:
-        self.number = self._worker.submit(
-            key,
+        self.job = self._jobs.start(
             getattr(telling, task),
             arguments,
             lambda value: self._events.put(("done", value)),
             lambda problem: self._events.put(("failed", problem)),
-            receive=(lambda value: self._events.put(("message", value))) if sends else None,
+            (lambda value: self._events.put(("message", value))) if sends else None,
+            key=key,
         )
 
     def next(self) -> tuple[str, Any]:
@@ -61,34 +64,34 @@ class Requester:
         return messages, event
 
     def assert_works(self) -> None:
-        """Check that the worker does what comes next."""
+        """Check that the process does what comes next."""
         self.request("say", "again", sends=False)
         assert self.next() == ("done", "again")
 
 
 @pytest.fixture(scope="module")
-def shared() -> Iterator[tuple[Worker, list[str]]]:
+def shared() -> Iterator[tuple[Jobs, list[str]]]:
     reports: list[str] = []
-    worker = Worker(reports.append)
-    yield worker, reports
-    worker.stop()
+    jobs = Jobs(reports.append)
+    yield jobs, reports
+    jobs.stop()
 
 
 @pytest.fixture
-def worker(shared: tuple[Worker, list[str]]) -> Worker:
+def jobs(shared: tuple[Jobs, list[str]]) -> Jobs:
     return shared[0]
 
 
 @pytest.fixture
-def reports(shared: tuple[Worker, list[str]]) -> list[str]:
+def reports(shared: tuple[Jobs, list[str]]) -> list[str]:
     """Return the reports of the worker, without those of tests before."""
     shared[1].clear()
     return shared[1]
 
 
 @pytest.fixture
-def requester(worker: Worker) -> Requester:
-    return Requester(worker)
+def requester(jobs: Jobs) -> Requester:
+    return Requester(jobs)
 
 
 def test_task_sends_all_messages_in_order_and_before_its_result(requester: Requester) -> None:
@@ -97,93 +100,90 @@ def test_task_sends_all_messages_in_order_and_before_its_result(requester: Reque
 
 
 def test_task_sends_messages_while_it_runs_and_ends_when_it_is_cancelled(
-    requester: Requester, worker: Worker, reports: list[str]
+    requester: Requester, jobs: Jobs, reports: list[str]
 ) -> None:
     requester.request("count_until_cancelled")
     # The task ends for no other reason, so this came before its end.
     assert requester.next() == ("message", 0)
-    process = worker.process_id
-    worker.cancel(requester.number, NEVER)
+    process = jobs.process_id()
+    requester.job.cancel(NEVER)
     messages, end = requester.all()
     assert end == ("done", len(messages) + 1)
     requester.assert_works()
-    assert worker.process_id == process
-    # One that is cancelled before it was begun ends at once.
-    requester.request("count_until_cancelled")
-    worker.cancel(requester.number, NEVER)
-    messages, end = requester.all()
-    assert end == ("done", len(messages))
+    assert jobs.process_id() == process
     # One that ends by an exception says so.
     requester.request("end_when_cancelled")
     assert requester.next() == ("message", 0)
-    worker.cancel(requester.number, NEVER)
+    requester.job.cancel(NEVER)
     assert requester.all()[1] == ("failed", CANCELLED)
     assert not reports
 
 
 def test_next_task_is_neither_cancelled_nor_killed_with_the_last(
-    requester: Requester, worker: Worker
+    requester: Requester, jobs: Jobs
 ) -> None:
     requester.request("count_until_cancelled")
-    worker.cancel(requester.number, NEVER)
-    first = requester.number
+    requester.job.cancel(NEVER)
+    first = requester.job
     requester.all()
-    process = worker.process_id
+    process = jobs.process_id()
     requester.request("count_until_cancelled")
     # The deadline of the first one passes now.
-    worker.cancel(first, AT_ONCE)
+    first.cancel(AT_ONCE)
     for number in range(100):
         assert requester.next() == ("message", number)
-    worker.cancel(requester.number, NEVER)
+    requester.job.cancel(NEVER)
     assert requester.all()[1][0] == "done"
-    assert worker.process_id == process
+    assert jobs.process_id() == process
 
 
 def test_task_that_does_not_end_when_cancelled_is_killed_without_a_report(
-    requester: Requester, worker: Worker, reports: list[str]
+    requester: Requester, jobs: Jobs, reports: list[str]
 ) -> None:
     requester.request("hang")
     assert requester.next() == ("message", 0)
-    process = worker.process_id
-    worker.cancel(requester.number, AT_ONCE)
-    assert requester.next() == ("failed", DIED_TWICE)
+    process = jobs.process_id()
+    requester.job.cancel(AT_ONCE)
+    assert requester.next() == ("failed", CANCELLED)
     assert not reports
     requester.assert_works()
-    assert worker.process_id != process
+    assert jobs.process_id() != process
 
 
 def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
-    worker: Worker, reports: list[str]
+    jobs: Jobs, reports: list[str]
 ) -> None:
-    first, second, third = (Requester(worker) for _ in range(3))
+    first, second, third, fourth = (Requester(jobs) for _ in range(4))
     first.request("count_until_cancelled")
     assert first.next() == ("message", 0)
-    process = worker.process_id
+    process = jobs.process_id()
     # Both wait for their turn.
     second.request("say", "still wanted", key="second", sends=False)
     third.request("say", "nobody asks any more", key="third", sends=False)
-    worker.cancel(third.number, NEVER)
-    worker.cancel(first.number, NEVER)
+    fourth.request("count_until_cancelled", key="fourth")
+    for each in (third, fourth, first):
+        each.job.cancel(NEVER)
     assert second.next() == ("done", "still wanted")
-    assert third.next() == ("failed", DIED_TWICE)
-    assert worker.process_id == process
+    assert fourth.next() == ("failed", CANCELLED)
+    assert third.next() == ("failed", CANCELLED)
+    assert jobs.process_id() == process
     assert not reports
 
 
 def test_task_that_is_cancelled_after_some_time_makes_room_for_the_next(
-    requester: Requester, worker: Worker, reports: list[str]
+    requester: Requester, jobs: Jobs, reports: list[str]
 ) -> None:
     requester.request("count_until_cancelled")
     assert requester.next() == ("message", 0)
-    process = worker.process_id
-    first = requester.number
+    process = jobs.process_id()
+    first = requester.job
     requester.request("count", 3)
-    worker.cancel(first, after=0.05)
+    first.cancel(after=0.05)
     messages, end = requester.all()
     # The first one ends for no other reason.
     assert end == ("done", len(messages) + 1)
     assert requester.all() == ([0, 1, 2], ("done", 3))
-    assert worker.process_id == process
+    assert jobs.process_id() == process
     assert not reports
 
 
@@ -209,39 +209,42 @@ def test_task_that_refuses_or_kills_its_process_is_reported(
     assert reports == expected
 
 
-def test_request_of_a_key_replaces_the_one_that_waits(requester: Requester, worker: Worker) -> None:
+def test_request_of_a_key_replaces_the_one_that_waits(requester: Requester, jobs: Jobs) -> None:
     requester.request("say", "first", sends=False)
     assert requester.next() == ("done", "first")
-    process = worker.process_id
+    process = jobs.process_id()
     assert process not in (None, os.getpid())
     assert process is not None
     # Stopped, so that it is at the first of them while the others are posted.
     os.kill(process, signal.SIGSTOP)
     for number in range(40):
         requester.request("say", str(number), sends=False)
+    # What has no key is replaced by none.
+    for text in ("one", "another"):
+        requester.request("say", text, key=None, sends=False)
     os.kill(process, signal.SIGCONT)
-    assert worker.wait_until_idle(PATIENCE)
+    assert jobs.wait_until_idle(PATIENCE)
     requester.request("say", "end", sends=False)
     results: list[str] = []
     while (result := requester.next()[1]) != "end":
         results.append(result)
-    assert len(results) <= 2
-    assert results[-1] == "39"
+    assert results[-3:] == ["39", "one", "another"]
+    assert len(results) <= 4
 
 
 def test_killed_worker_is_reported_and_started_again(
-    requester: Requester, worker: Worker, reports: list[str]
+    requester: Requester, jobs: Jobs, reports: list[str]
 ) -> None:
     requester.request("say", "first", sends=False)
     assert requester.next() == ("done", "first")
-    first = worker.process_id
+    first = jobs.process_id()
     assert first is not None
     # Stopped, so that the kill hits it in the middle of its work, which is done all the same.
     os.kill(first, signal.SIGSTOP)
     requester.request("say", "again", sends=False)
     os.kill(first, signal.SIGKILL)
     assert requester.next() == ("done", "again")
-    second = worker.process_id
+    second = jobs.process_id()
     assert second not in (None, first)
     assert second is not None
     # And once more, while it has nothing to do.
@@ -249,19 +252,19 @@ def test_killed_worker_is_reported_and_started_again(
     requester.request("say", "once more", sends=False)
     assert requester.next() == ("done", "once more")
     assert reports == [RESTARTED] * 2
-    assert worker.process_id not in (None, first, second)
+    assert jobs.process_id() not in (None, first, second)
 
 
 def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
     reports: list[str] = []
-    worker = Worker(reports.append)
-    requester = Requester(worker)
+    jobs = Jobs(reports.append)
+    requester = Requester(jobs)
     requester.request("hang")
     assert requester.next() == ("message", 0)
-    process = worker.process_id
+    process = jobs.process_id()
     assert process is not None
     os.kill(process, signal.SIGSTOP)
-    worker.stop()
+    jobs.stop()
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
     assert not reports
@@ -270,15 +273,15 @@ def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
 def test_worker_process_ends_when_its_parent_is_gone() -> None:
     code = """
 import os, sys
-from explorer.page.session.worker import Worker
+from explorer.jobs.jobs import Jobs
 from tests.app import telling
-worker = Worker(print)
+jobs = Jobs(print)
 def receive(value):
     if value == 5:
-        print(worker.process_id, flush=True)
+        print(jobs.process_id(), flush=True)
         os._exit(0)
-worker.submit("task", telling.count_until_cancelled, (), print, print, receive=receive)
-worker.wait_until_idle(600.0)
+jobs.start(telling.count_until_cancelled, (), print, print, receive)
+jobs.wait_until_idle(600.0)
 """
     done = subprocess.run(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=ROOT, check=True
@@ -337,12 +340,13 @@ def test_error_of_a_task_is_logged_and_reported_unless_it_is_a_refusal(
 ) -> None:
     messages, failed = list[str](), Queue[str]()
     receive = None if task == "fall" else Queue[object]().put
-    worker = Worker(messages.append, died="it died")
+    jobs = Jobs(messages.append)
     try:
-        worker.submit(task, getattr(telling, task), arguments, failed.put, failed.put, receive)
+        call = getattr(telling, task)
+        jobs.start(call, arguments, failed.put, failed.put, receive, died="it died")
         assert failed.get(timeout=PATIENCE) == problem
     finally:
-        worker.stop()
+        jobs.stop()
     assert len(messages) == len(reports)
     assert all(report in each for report, each in zip(reports, messages, strict=True))
     assert log.exists() == bool(logged)

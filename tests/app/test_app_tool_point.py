@@ -18,7 +18,7 @@ import viser
 from desk import Desk, ScriptedBrowser, by_name, number, rows_of
 from hypothesis import given, strategies as st
 from page_widgets import widgets
-from services import StubDownloads, StubWorker
+from services import StubDownloads, StubJobs
 from strategies import Case, all_cases
 from workspace_feeds import draw
 
@@ -73,7 +73,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Assigner
-from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 TOOL: Triple = (1.0, 0.0, 3.0)
@@ -568,8 +568,8 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
         state = Set("compared.look", Look(overlay=True)).apply(Pin(other).apply(state_at(at)))
         for feed in FEEDS:
             services.get(feed).follow(Frame(state))
-        assert isinstance(services.worker, StubWorker)
-        services.worker.work()
+        assert isinstance(services.jobs, StubJobs)
+        services.jobs.work()
         placed = Placed(Frame(state))
         scenes = [services.get(part) for part in SCENES]
         nodes = by_name(update for scene in scenes for update in scene.updates(placed))
@@ -582,7 +582,7 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
             if at == "tool":
                 points = points - home.rotation @ np.array(design.tool.position)
             for p in points[:: len(points) // 50]:
-                slack = min(limit.slack(p) for limit in constraints(design, home.rotation))
+                slack = min(limit.slack(p) for limit in Workspace(design, home.rotation).limits)
                 assert abs(float(slack)) < 0.05 * design.reach
             corners = np.asarray(node["vertices"]) + node["position"]
             ends = [corners.min(axis=0), corners.max(axis=0)]

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from hypothesis import given
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.mechanism.modes import modes_table, present_mode
@@ -35,6 +35,7 @@ from explorer.numerics.number_text import Unit
 from explorer.singularity.colours import SINGULAR, WARN_SHARE, WARNED, css, proximity_colour
 from explorer.singularity.strata import COVERED, OF_INCIDENCES, incidences
 from explorer.workspace.position_bands import position_bands
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -114,7 +115,7 @@ def test_verdict_where_the_map_warns_is_never_clear(
     for design in PRESETS.values():
         rng, reach, place = np.random.default_rng(7), design.reach, design.home_pose
         warn_below = WARN_SHARE * reach if share is None else share * reach
-        bands = position_bands(design, place.rotation, measure, warn_below=warn_below)
+        bands = position_bands(Workspace(design, place.rotation), measure, warn_below=warn_below)
         points = rng.uniform([-reach, -reach, 0.0], reach, (500, 3))
         warned = points[bands.values(points) < 1.0][:30]
         assert len(warned) > 5
@@ -194,8 +195,8 @@ def test_modes_that_meet_in_a_pose_differ_in_the_signs_that_vanish(case: Case) -
 def test_distances_of_deeper_strata_are_shown_at_a_singular_pose_without_the_diagram() -> None:
     singular = GoToSingularity(2).apply(open_state(OPTIMAL))
     frame = Frame(Set("view.singular.strata", value=False).apply(singular))
-    worker = StubWorker(at_once=True)
-    feed = STRATA_FEED(services_for(worker=worker))
+    jobs = StubJobs(at_once=True)
+    feed = STRATA_FEED(services_for(jobs=jobs))
     feed.follow(frame)
     distances = distances_of(frame, feed)
     assert set(COVERED[OF_INCIDENCES[1]]) <= set(distances)

@@ -51,6 +51,7 @@ from explorer.workspace.carried_region import carried_region
 from explorer.workspace.position_bands import SHARE_COLOURS, SHARES, STEP_COLOURS
 from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -230,7 +231,7 @@ def test_map_has_the_exact_outline_of_the_slice(axis: Axis) -> None:
     drawn = drawing.slice_map
     assert drawn is not None
     rotation = np.array(drawing.request.rotation)
-    outline = slice_outline(OPTIMAL, rotation, axis, drawn.level)
+    outline = slice_outline(Workspace(OPTIMAL, rotation), axis, drawn.level)
     assert outline is not None
     (data,) = re.findall(r'<path d="([^"]*)" class="edge"', drawn.markup)
     assert data.count("A") >= sum(e.centre is not None for loop in outline for e in loop)
@@ -458,7 +459,7 @@ def test_map_words_tell_the_measure_at_a_position(colour: str, reading: str) -> 
     design = {"share": LOADED, "error": PRECISE, "deflection": PRECISE}.get(colour, OPTIMAL)
     mapped = drawing_of(load_state(design, colour=colour, cut="y")).slice_map
     assert mapped is not None
-    rotation, digit = mapped.colouring.rotation, 0.005
+    rotation, digit = mapped.colouring.workspace.rotation, 0.005
     for x, z in ((12.5, 7.25), (3.0, 12.125), (9.0, 1.0)):
         words = mapped.words_at((x, mapped.level, z), UNITS)
         found = re.fullmatch(rf"x {x:.2f}, z {z:.2f} units: {reading}", words)
@@ -571,12 +572,12 @@ def test_part_that_holds_the_load_is_drawn_and_measured(
     assert drawing.trouble is None
     rotation = np.array(drawing.request.rotation)
     assert drawing.part is not None
-    expected = carried_region(LOADED, rotation, LOAD).held_volume
+    expected = carried_region(Workspace(LOADED, rotation), LOAD).held_volume
     assert drawing.part.volume == pytest.approx(expected, rel=5e-3)
     assert 0.1 < expected / drawing.volume < 0.9
     words = drawing_words(Frame(load_state(region="held")), feed)
     assert "hold the load" in words
-    assert f"{round(100.0 * drawing.part.volume / drawing.volume, 2):g} %" in words
+    assert f"{100.0 * drawing.part.volume / drawing.volume:.2f} %" in words
     assert "(3, 0, −40) N at the tool, (0, 0.2, 0) N m, 0.5 kg of payload" in words
     assert {shell.colour for shell in drawing.surface.shells} == {PLAIN, AT_LIMIT}
     for shell in drawing.surface.shells:

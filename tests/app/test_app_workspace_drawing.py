@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +15,7 @@ import msgspec
 import numpy as np
 import pytest
 from desk import viewed
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 
 from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED, surface_of
@@ -27,16 +28,18 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import SetVariable
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import WorkspaceView
+from explorer.jobs.jobs import Jobs
+from explorer.jobs.process import Channel
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
-from explorer.page.session.worker import CancelledError, Channel, Worker
 from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.workspace.accessible.radii import with_radius
-from explorer.workspace.slices.volume import workspace_nodes
+from explorer.workspace.slices.volume import node_count_of
 from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME_ROWS = tuple(tuple(row) for row in OPTIMAL.home_pose.rotation.tolist())
@@ -61,10 +64,10 @@ def a_request(**changes: Any) -> work.WorkspaceRequest:
 
 
 @pytest.fixture(scope="module")
-def worker() -> Iterator[Worker]:
-    worker = Worker(pytest.fail)
-    yield worker
-    worker.stop()
+def jobs() -> Iterator[Jobs]:
+    jobs = Jobs(pytest.fail)
+    yield jobs
+    jobs.stop()
 
 
 def with_solid(state: State) -> State:
@@ -72,20 +75,20 @@ def with_solid(state: State) -> State:
 
 
 def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numbers(
-    worker: Worker,
+    jobs: Jobs,
 ) -> None:
     redraws = threading.Semaphore(0)
-    feed = WORKSPACE_FEED(services_for(worker=worker, redraw=redraws.release))
+    feed = WORKSPACE_FEED(services_for(jobs=jobs, redraw=redraws.release))
     feed.follow(Frame(open_state(OPTIMAL)))
-    assert worker.wait_until_idle(PATIENCE)
+    assert jobs.wait_until_idle(PATIENCE)
     # A hidden drawing is not requested.
-    assert worker.process_id is None
+    assert jobs.process_id() is None
     assert feed.drawing is None
     state = with_solid(open_state(OPTIMAL))
     for i in range(25):
         state = SetVariable("a3x", 18.0 + 0.05 * i).apply(state)
         feed.follow(Frame(state))
-    assert worker.wait_until_idle(PATIENCE)
+    assert jobs.wait_until_idle(PATIENCE)
     assert feed.drawing is not None
     assert feed.is_current
     assert feed.drawing.request.design.a3[0] == 18.0 + 0.05 * 24
@@ -96,7 +99,7 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     surface = surface_of(feed)
     assert surface is not None
     assert surface.request.design.a3[0] == 18.5
-    assert worker.wait_until_idle(PATIENCE)
+    assert jobs.wait_until_idle(PATIENCE)
     assert feed.drawing is not None
     assert surface_of(feed) is feed.drawing.surface
     feed.follow(Frame(open_state(OPTIMAL)))
@@ -137,7 +140,7 @@ def test_bands_of_margins_contain_the_values_of_their_colour(
 ) -> None:
     """Also within facets, which margins cross linearly and their minimum does not."""
     solid = workspace_solid(OPTIMAL, rotation, 0.3)
-    colouring = Colouring(OPTIMAL, rotation, "margin", warn_below)
+    colouring = Colouring(Workspace(OPTIMAL, rotation), "margin", warn_below)
     shells = colouring.shells(creased_faces(solid))
     rng = np.random.default_rng(3)
     for shell in shells:
@@ -155,7 +158,7 @@ def test_bands_meet_where_the_measure_is_their_level(colour: Any, cut: Any) -> N
     drawing = work.draw_workspace(a_request(colour=colour, cut=cut, level=None))
     request = drawing.request
     colouring = Colouring(
-        request.design, np.array(request.rotation), request.colour, request.warn_below
+        Workspace(request.design, np.array(request.rotation)), request.colour, request.warn_below
     )
     shells = {band_colours().index(shell.colour): shell for shell in drawing.surface.shells}
     met = 0
@@ -224,7 +227,7 @@ def test_cancelled_drawing_ends_at_the_next_stage_and_keeps_nothing_of_it(last: 
 
 def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
     design = msgspec.structs.replace(OPTIMAL, node_step=0.25)
-    assert workspace_nodes(design).count > work.MOST_LIVE_NODES
+    assert node_count_of(Workspace(design)).count > work.MOST_LIVE_NODES
     drawing = work.draw_workspace(accessible_request(design))
     assert drawing.trouble is None
     assert drawing.part is not None
@@ -236,18 +239,18 @@ def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
 
 
 def test_cancelled_drawing_leaves_none_of_an_older_design() -> None:
-    worker = StubWorker()
-    feed = WORKSPACE_FEED(services_for(worker=worker))
+    jobs = StubJobs()
+    feed = WORKSPACE_FEED(services_for(jobs=jobs))
     state = viewed(open_state(THICK), workspace=WorkspaceView(solid=True))
     feed.follow(Frame(state))
-    drawing = work.draw_workspace(worker.orders[0].request)
-    worker.orders[0].done(drawing)
+    drawing = work.draw_workspace(jobs.orders[0].request)
+    jobs.orders[0].done(drawing)
     assert feed.drawing is drawing
     feed.follow(Frame(SetVariable("a3x", 18.0).apply(state)))
     assert feed.drawing is drawing
     feed.cancel()
     assert feed.drawing is None
-    worker.orders[0].done(drawing)
+    jobs.orders[0].done(drawing)
     assert feed.drawing is None
     feed.retry()
     assert not feed.is_settled
@@ -257,8 +260,8 @@ def test_drawing_shows_its_stage_and_is_cancelled_and_requested_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(session_feed, "LONG_SECONDS", 0.0)
-    worker, redraws = Worker(lambda _: None), threading.Semaphore(0)
-    feed = WORKSPACE_FEED(services_for(worker=worker, redraw=redraws.release))
+    jobs, redraws = Jobs(lambda _: None), threading.Semaphore(0)
+    feed = WORKSPACE_FEED(services_for(jobs=jobs, redraw=redraws.release))
 
     def wait_for(condition: Callable[[], object]) -> None:
         while not condition():
@@ -276,18 +279,18 @@ def test_drawing_shows_its_stage_and_is_cancelled_and_requested_again(
         assert "Stopped" in drawing_words(frame, feed)
         # The same frame does not ask for it again by itself.
         feed.follow(frame)
-        assert worker.wait_until_idle(PATIENCE)
+        assert jobs.wait_until_idle(PATIENCE)
         assert feed.is_cancelled
         assert feed.drawing is None
         feed.retry()
         # What is shown no more is not computed to its end.
         wait_for(lambda: feed.stage is not None)
         feed.follow(Frame(viewed(state, workspace=WorkspaceView(region="accessible"))))
-        assert worker.wait_until_idle(PATIENCE)
+        assert jobs.wait_until_idle(PATIENCE)
         assert (feed.problem, feed.drawing) == (None, None)
         feed.follow(frame)
         wait_for(lambda: feed.is_current)
         assert not feed.is_cancelled
         assert "cm³" in drawing_words(frame, feed)
     finally:
-        worker.stop()
+        jobs.stop()

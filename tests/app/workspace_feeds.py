@@ -1,11 +1,11 @@
-"""Drawings of feeds, with a worker that computes on request; those of the workspace."""
+"""Drawings of feeds, with a jobs that computes on request; those of the workspace."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from services import StubWorker, services_for
+from services import StubJobs, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feature import WORKSPACE
@@ -18,24 +18,24 @@ from explorer.app.state.state import State
 Drawing = TypeVar("Drawing")
 
 
-def follow(services: Services, state: State) -> StubWorker:
+def follow(services: Services, state: State) -> StubJobs:
     """Have both feeds of the workspace request and get what a state needs."""
-    worker = services.worker
-    assert isinstance(worker, StubWorker)
+    jobs = services.jobs
+    assert isinstance(jobs, StubJobs)
     for kind in WORKSPACE.feeds:
         services.get(kind).follow(Frame(state))
-    worker.work()
-    return worker
+    jobs.work()
+    return jobs
 
 
 def draw(
     services: Services, kind: Callable[[Services], Feed[Any, Drawing]], state: State
 ) -> Drawing:
     """Have a feed request the drawing of a state; return it."""
-    worker, feed = services.worker, services.get(kind)
-    assert isinstance(worker, StubWorker)
+    jobs, feed = services.jobs, services.get(kind)
+    assert isinstance(jobs, StubJobs)
     feed.follow(Frame(state))
-    worker.work()
+    jobs.work()
     assert feed.drawing is not None
     return feed.drawing
 

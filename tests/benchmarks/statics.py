@@ -29,8 +29,9 @@ from explorer import (
 )
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import GUIDE_ROWS, STRUT_ROWS
 from explorer.mechanism.machine import STANDARD_GRAVITY
-from explorer.motion.inverse_jacobian import GUIDE_ROWS, STRUT_ROWS, twists_of_actuators
+from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.motion.masses import DENSITY, bar_masses, moving_bodies
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.compiled import warm

@@ -28,6 +28,7 @@ from explorer.statics.accuracy import SOURCES
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.solids.solid import convex_hull
 from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.workspace import Workspace
 
 COMMAND = ("export",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -70,7 +71,7 @@ LIMITED = msgspec.structs.replace(
 
 def test_export_with_a_load_writes_the_part_that_holds_it(cli: CommandLine, tmp_path: Path) -> None:
     load = (0.0, 0.0, -20.0, 0.0, 5.0, 0.0)
-    solid = carried_region(LIMITED, load=load).solid
+    solid = carried_region(Workspace(LIMITED), load=load).solid
     assert solid.is_watertight
     for what, expected in (("workspace", solid), ("hull", convex_hull(solid))):
         out = tmp_path / f"{what}.stl"

@@ -17,9 +17,10 @@ from explorer.workspace.orientations.share import (
     orientation_capability,
     yaw_pitch_roll_range,
 )
-from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import node_count_of, workspace_volume
 from explorer.workspace.solids.solid import Solid, convex_hull
 from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
+from explorer.workspace.workspace import Workspace
 
 COMMAND = ("workspace",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -35,7 +36,7 @@ def test_workspace_json_has_the_public_measures(cli: CommandLine) -> None:
     assert set(found) == KEYS
     volume, nodes, solid = (
         workspace_volume(OPTIMAL),
-        workspace_nodes(OPTIMAL),
+        node_count_of(Workspace(OPTIMAL)),
         workspace_solid(OPTIMAL),
     )
     assert found["volume"] == pytest.approx(volume.volume, rel=1e-12)
@@ -67,7 +68,7 @@ def test_workspace_orientation_step_and_tolerance_are_used(cli: CommandLine) -> 
     found = cli.answer("--yaw-pitch-roll", "-60", "5", "2", "--step", "3", *COARSE, "--hull")
     rotation = explorer.rotation_from_yaw_pitch_roll([-60.0, 5.0, 2.0])
     assert found["volume"] == pytest.approx(workspace_volume(OPTIMAL, rotation).volume, rel=1e-9)
-    assert found["node_count"] == workspace_nodes(OPTIMAL, rotation, 3.0).count
+    assert found["node_count"] == node_count_of(Workspace(OPTIMAL, rotation), 3.0).count
     solid = workspace_solid(OPTIMAL, rotation, 0.4)
     assert found["mesh"]["triangles"] == len(solid.faces)
     assert found["hull_volume"] == pytest.approx(convex_hull(solid).volume, rel=1e-9)

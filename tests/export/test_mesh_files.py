@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import trimesh
 from mesh_files import glb_json, mesh_of, metadata_of, read_3mf
+from part_gaps import vertices_at
 
 from explorer import PRESETS, Design, ExplorerError, InputError, NoAnswerError, decode_design
 from explorer.export.assembly import COLOURS, assembly_bytes
@@ -208,7 +209,7 @@ PROTOTYPE = make_prototype(ASSEMBLED)
 HOME = ASSEMBLED.home_pose
 MESH_FORMATS = ("3mf", "glb", "stl-zip")
 PARTS = [part.name for part in PROTOTYPE.parts]
-AT_HOME = dict(zip(PARTS, PROTOTYPE.at(HOME.position, HOME.rotation), strict=True))
+AT_HOME = dict(zip(PARTS, vertices_at(PROTOTYPE, HOME.position, HOME.rotation), strict=True))
 DATA = {file_format: assembly_bytes(PROTOTYPE, file_format) for file_format in MESH_FORMATS}
 
 
@@ -309,7 +310,7 @@ def test_glb_moved_joints_move_the_mechanism() -> None:
         parent = scene.graph.transforms.parents[node["name"]]
         before = scene.graph.get(node["name"], parent)[0]
         scene.graph.update(node["name"], parent, matrix=before @ move)
-    moved = dict(zip(PARTS, PROTOTYPE.at(position, HOME.rotation), strict=True))
+    moved = dict(zip(PARTS, vertices_at(PROTOTYPE, position, HOME.rotation), strict=True))
     for leg in (1, 2, 3, 4):
         transform, geometry = scene.graph[f"rod {leg}"]
         points = np.asarray(scene.geometry[geometry].vertices) @ transform[:3, :3].T

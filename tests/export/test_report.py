@@ -39,9 +39,10 @@ from explorer.singularity.ellipsoids import performance, singularity_free_ball
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.least_clearance import least_clearances
-from explorer.workspace.slices.volume import workspace_nodes
+from explorer.workspace.slices.volume import node_count_of
 from explorer.workspace.solids.solid import convex_hull
 from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 DAY = dt.date(2026, 3, 9)
@@ -147,7 +148,7 @@ def test_report_workspace_tables_hold_public_measures(seed: int) -> None:
     rotation = design.home_pose.rotation
     page, cubic = ordinary_page(seed), (0.1 * design.unit_mm) ** 3
     volume = explorer.workspace_volume(design, rotation)
-    nodes = workspace_nodes(design, rotation)
+    nodes = node_count_of(Workspace(design, rotation))
     solid = workspace_solid(design, rotation)
     rows = table_of(page, "Volumes")
     assert rows["exact volume"].values == [volume.volume, volume.volume * cubic]
@@ -197,7 +198,7 @@ def test_report_singularity_and_leg_tables_hold_snapshot(seed: int) -> None:
     gains = performance(design, home).translation.gain.tolist()
     speeds = table_of(page, "Speed of b4")
     assert [row.values[3] for row in speeds.values()] == gains
-    least = least_clearances(design, home.rotation).clearance
+    least = least_clearances(Workspace(design, home.rotation)).clearance
     here = table_of(page, "Clearance here")
     lows = table_of(page, "Least clearance in the workspace")
     clearances = snapshot.clearances.clearance.tolist()
@@ -382,7 +383,7 @@ def test_slice_bands_hold_the_positions_of_their_margins() -> None:
     home = OPTIMAL.home_pose
     solid = workspace_solid(OPTIMAL, home.rotation)
     extent = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    slices = Slices.of(OPTIMAL, home.rotation, extent)
+    slices = Slices.of(Workspace(OPTIMAL, home.rotation), extent)
     rng = np.random.default_rng(1)
     level, index = 5.0, 5
     points = rng.uniform(slices.lows, slices.highs, (400, 3))

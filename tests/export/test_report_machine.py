@@ -26,6 +26,7 @@ from explorer.motion.weights import MovingBodies
 from explorer.paths.drives import TimedPath, drives_along
 from explorer.statics.reactions import Reactions, limit_shares
 from explorer.workspace.carried_region import carried_region
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 ZERO = np.zeros(6)
@@ -118,7 +119,7 @@ def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
             assert found == [weight, force, limit, 100.0 * float(shares[index])]
             assert f" {k + 2}" in parts[place + k].text
     worst = worst_payload_force(ReportData(design))
-    assert worst.share == pytest.approx(float(shares.max()), rel=1e-9)
+    assert worst.utilisation == pytest.approx(float(shares.max()), rel=1e-9)
 
 
 def test_report_of_a_pose_tells_at_home_what_home_has() -> None:
@@ -134,7 +135,7 @@ def test_report_of_a_pose_tells_at_home_what_home_has() -> None:
 def test_report_loads_volume_is_that_of_held_workspace_beside_the_whole() -> None:
     design = loaded_case(1)
     page, rotation = loaded_page(1), design.home_pose.rotation
-    held = carried_region(design, rotation)
+    held = carried_region(Workspace(design, rotation))
     whole = explorer.workspace_volume(design, rotation).volume
     cubic = (0.1 * design.unit_mm) ** 3
     rows = {next(row.all("th")).text: row.values for row in page.all("tr") if any(row.all("th"))}
@@ -196,7 +197,7 @@ def test_report_of_too_large_a_load_names_the_best_position() -> None:
     payload = msgspec.structs.replace(design.payload, mass_kg=1e4)
     design = msgspec.structs.replace(design, payload=payload)
     page = page_of(design)
-    held = carried_region(design, design.home_pose.rotation)
+    held = carried_region(Workspace(design, design.home_pose.rotation))
     assert held.best is not None
     assert held.factor is not None
     assert "Does not hold the payload" in page.text

@@ -32,7 +32,7 @@ from explorer.export.simulation import (
 from explorer.mechanism.design import Swing
 from explorer.mechanism.margins import mode_of
 from explorer.motion.chains import ACTUATED, CHAIN_JOINTS, Chains
-from explorer.motion.masses import ball, bar, mesh_mass, total_mass
+from explorer.motion.masses import Mass, ball, bar, total_mass
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
 
@@ -326,7 +326,9 @@ def test_masses_of_bars_balls_and_meshes_agree() -> None:
     sphere = shapes.icosphere(5, 0.7)
     sphere.apply_translation([3.0, 1.0, 0.0])
     found = bar(0.5, start, end, 2.0), ball(0.7, np.array([3.0, 1.0, 0.0]), 2.0)
-    meshes = [mesh_mass(each.vertices, each.faces, 2.0) for each in (rod, sphere)]
+    for each in (rod, sphere):
+        each.density = 2.0
+    meshes = [Mass(each.mass, each.center_mass, each.moment_inertia) for each in (rod, sphere)]
     for exact, mesh in zip((*found, total_mass(found)), (*meshes, total_mass(meshes)), strict=True):
         assert mesh.mass == pytest.approx(exact.mass, rel=2e-3)
         np.testing.assert_allclose(mesh.centre, exact.centre, atol=1e-3)

@@ -26,9 +26,10 @@ from explorer.export.mesh import colour_of
 from explorer.export.opencascade import coordinates, faces_of, occ, volume_of
 from explorer.export.step import exact_workspace, step_bytes
 from explorer.mechanism.design import Swing
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
-SOLID = exact_workspace(OPTIMAL)
+SOLID = exact_workspace(Workspace(OPTIMAL))
 
 
 def cubic_mm(design: Design, volume: float) -> float:
@@ -40,13 +41,13 @@ def test_step_workspace_volume_is_exact(design: Design) -> None:
     for unit in (1.0, 250.0):
         scaled = msgspec.structs.replace(design, unit_mm=unit)
         expected = cubic_mm(scaled, workspace_volume(design).volume)
-        assert exact_workspace(scaled).volume == pytest.approx(expected, rel=1e-6)
+        assert exact_workspace(Workspace(scaled)).volume == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("index", [0, 5, 9, 17, 19, 21])
 def test_step_shells_slabs_and_tilted_planes_have_exact_volume(index: int) -> None:
     design, rotation, _ = reference_case(index)
-    solid = exact_workspace(design, rotation)
+    solid = exact_workspace(Workspace(design, rotation))
     expected = cubic_mm(design, workspace_volume(design, rotation).volume)
     assert solid.volume == pytest.approx(expected, rel=1e-5)
 
@@ -56,7 +57,7 @@ def test_step_shells_slabs_and_tilted_planes_have_exact_volume(index: int) -> No
 )
 def test_step_cones_and_wedges_have_exact_volume(swing: Swing) -> None:
     design = limited(OPTIMAL, swing=swing)
-    solid, expected = exact_workspace(design), workspace_volume(design)
+    solid, expected = exact_workspace(Workspace(design)), workspace_volume(design)
     off = abs(solid.volume - cubic_mm(design, expected.volume))
     assert off <= cubic_mm(design, 1e-6 * expected.volume + expected.error)
 
@@ -67,13 +68,13 @@ def face_kinds(shape: Any) -> list[str]:
 
 
 def test_step_faces_are_surfaces_of_their_limits() -> None:
-    solid = exact_workspace(OPTIMAL)
+    solid = exact_workspace(Workspace(OPTIMAL))
     kinds = dict(zip(solid.limit_of_face, face_kinds(solid.shape), strict=True))
     assert kinds["l1 maximum"] == kinds["l4 maximum"] == "Sphere"
     assert kinds["d2 maximum"] == "Cylinder"
     assert {kind for limit, kind in kinds.items() if limit.startswith("box")} == {"Plane"}
     assert len(kinds) >= 9
-    cone = exact_workspace(limited(OPTIMAL, swing=Swing(a1=30.0)))
+    cone = exact_workspace(Workspace(limited(OPTIMAL, swing=Swing(a1=30.0))))
     kinds = dict(zip(cone.limit_of_face, face_kinds(cone.shape), strict=True))
     assert kinds["swing a1"] == "Cone"
 
@@ -87,7 +88,7 @@ def read(path: Path) -> Any:
 
 def test_step_file_reads_back_names_colours_and_volume(tmp_path: Path) -> None:
     design = msgspec.structs.replace(OPTIMAL, unit_mm=12.5, name="Räume")
-    solid = exact_workspace(design)
+    solid = exact_workspace(Workspace(design))
     data = step_bytes(solid, f"workspace of {design.name}")
     assert b"AP242" in data[:600]
     assert b"SI_UNIT(.MILLI.,.METRE.)" in data
@@ -148,7 +149,7 @@ def test_step_any_name_is_written_as_the_standard_says(name: str, tmp_path: Path
 
 
 def test_step_workspace_shifted_to_the_tool_keeps_faces_and_volume() -> None:
-    solid = exact_workspace(OPTIMAL)
+    solid = exact_workspace(Workspace(OPTIMAL))
     offset = np.array([31.0, -17.5, 120.0])
     shifted = solid.shift(offset)
     assert shifted.limit_of_face == solid.limit_of_face
@@ -165,10 +166,10 @@ def test_step_workspace_shifted_to_the_tool_keeps_faces_and_volume() -> None:
 
 def test_step_empty_or_thin_workspace_is_refused() -> None:
     with pytest.raises(NoAnswerError, match=r"empty: margin δ2"):
-        exact_workspace(OPTIMAL, np.eye(3))
+        exact_workspace(Workspace(OPTIMAL, np.eye(3)))
     thin: Any = {"box": ((0.0, -12.0, 5.0), (20.0, 22.0, 5.0 + 1e-7))}
     with pytest.raises(ExplorerError, match=r"too thin|cannot combine"):
-        exact_workspace(limited(OPTIMAL, **thin))
+        exact_workspace(Workspace(limited(OPTIMAL, **thin)))
 
 
 @pytest.mark.parametrize("below", [False, True])

@@ -25,6 +25,7 @@ from explorer.optimise.search.model import Model, reported_objective
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 EXTREMES = [*(f"exact_extent_{axis}" for axis in "xyz"), "least_margin"]
@@ -60,14 +61,16 @@ def test_measures_at_a_pose_are_of_its_orientation_but_those_of_home_are_not() -
 def test_extremes_of_separate_parts_are_those_of_each_part() -> None:
     design = limited(OPTIMAL, margin=None, box=((0.0, -12.0, -3.0), (20.0, 22.0, 18.0)))
     r = design.home_pose.rotation
-    assert np.array(extent_of(design, r)) == pytest.approx(np.array(design.limits.box), abs=1e-9)
-    least = least_margins(design, r)
+    assert np.array(extent_of(Workspace(design, r))) == pytest.approx(
+        np.array(design.limits.box), abs=1e-9
+    )
+    least = least_margins(Workspace(design, r))
     assert least is not None
     assert least.tolist() == [0.0, 0.0, 0.0]
     # At a yaw |δ2| is |z sin(yaw)|, the others are |z|.
     height = 0.5 / abs(r[1, 0])
     expected = np.array([height, 0.5, height])
-    assert least_margins(limited(design, margin=0.5), r) == pytest.approx(expected)
+    assert least_margins(Workspace(limited(design, margin=0.5), r)) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -75,8 +78,8 @@ def test_least_clearance_alone_equals_that_of_all_pairs(seed: int) -> None:
     design, rotation = ordinary_case(seed) if seed % 2 else troubled_case(seed)
     radii = np.random.default_rng(seed).uniform(0.0, 0.05, 4) * design.reach
     design, tolerance = limited(design, leg_radii=tuple(radii.tolist())), 1e-3 * design.reach
-    full = least_clearances(design, rotation, tolerance)
-    least = least_clearances(design, rotation, tolerance, only_least=True)
+    full = least_clearances(Workspace(design, rotation), tolerance)
+    least = least_clearances(Workspace(design, rotation), tolerance, only_least=True)
     one, other = float(full.clearance.min()), float(least.clearance.min())
     if math.isinf(one):
         assert math.isinf(other)
@@ -93,7 +96,7 @@ def test_clearance_beyond_counts_off_singular_planes_only() -> None:
     case = Case(OPTIMAL, margin=0.05 * OPTIMAL.reach)
     clearance, pair = case.clearance
     assert Case(OPTIMAL).clearance == case.clearance
-    full = least_clearances(limited(OPTIMAL, margin=case.margin))
+    full = least_clearances(Workspace(limited(OPTIMAL, margin=case.margin)))
     assert clearance == pytest.approx(full.clearance.min(), abs=1e-3 * OPTIMAL.reach)
     assert pair == PAIRS[int(full.clearance.argmin())]
     assert np.isnan(Case(OPTIMAL, margin=100.0).clearance[0])

@@ -130,7 +130,7 @@ def test_conflicts_of_random_problems_are_never_contradicted(count: int) -> None
                 design = problem.design_at(values)
             except DesignError:
                 continue
-            volume = workspace_volume(design, explain=False).volume
+            volume = workspace_volume(design).volume
             reach = dict(zip(problem.names, values, strict=True)).get("reach", design.reach)
             # The bounds are those of a problem whose demand of a reach is met.
             if demanded is None or reach <= demanded:

@@ -57,8 +57,9 @@ from explorer.optimise.problem import (
 from explorer.optimise.search.model import Model
 from explorer.optimise.search.sqp import optimality
 from explorer.optimise.search.starts import more_starts
-from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.constraints import slacks
 from explorer.workspace.orientations.tilts import tilt_map
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -74,7 +75,7 @@ def least_clearance_by_sampling(design: Design, margin: float, count: int) -> fl
     lows, highs = np.array(design.limits.box)
     p = lows + (highs - lows) * random.random((count, 3))
     p[: count // 2, 2] = margin * (1.0 + 0.05 * random.random(count // 2))
-    inside = slacks(constraints(design, rotation), p).min(axis=-1) >= 0.0
+    inside = slacks(Workspace(design, rotation).limits, p).min(axis=-1) >= 0.0
     inside &= np.abs(margins(p, rotation)).min(axis=-1) >= margin
     return float(leg_clearances(Configuration(design, p[inside], rotation)).clearance.min())
 
@@ -258,7 +259,7 @@ def test_largest_margin_with_free_yaw_and_shifts_is_the_height() -> None:
     moved = raised.problem.required_box_at(raised.best.values)
     rotation = raised.design.home_pose.rotation
     corners = corners_of(moved)
-    assert slacks(constraints(raised.design, rotation), corners).min() >= -1e-6
+    assert slacks(Workspace(raised.design, rotation).limits, corners).min() >= -1e-6
     assert np.abs(margins(corners, rotation)).min() == pytest.approx(14.0, abs=1e-6)
 
 

@@ -164,7 +164,7 @@ def test_required_box_demand_agrees_with_all_positions_of_the_box() -> None:
         boxed = np.array([name.startswith("required box") for name in model.names])
         shares = np.indices((13, 13, 13)).reshape(3, -1).T / 12.0
         inside = middle - half + 2.0 * half * shares
-        least = min(float(limit.slack(inside).min()) for limit in at.state.limits)
+        least = min(float(limit.slack(inside).min()) for limit in at.state.workspace.limits)
         if abs(least) < 0.05:
             # Between the positions that are looked at here the box may come nearer.
             continue

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from explorer import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.constraints import Cone, HalfSpace, Never, constraints
+from explorer.workspace.limits.constraints import Cone, HalfSpace, Never
 from explorer.workspace.solids.solid import Solid
+from explorer.workspace.workspace import Workspace
 
 
 def corners_of(solid: Solid) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -32,7 +33,7 @@ def edges_are_paired(faces: NDArray[np.int32]) -> bool:
 
 def assert_lies_on_its_limits(solid: Solid, design: Design, rotation: FloatArray) -> None:
     """Check that faces lie on the limits that they name, and that vertices satisfy all limits."""
-    limits = constraints(design, rotation)
+    limits = Workspace(design, rotation).limits
     most = solid.tolerance * (1.0 + 1e-6)
     for index, name in enumerate(solid.limits):
         faces = solid.faces[solid.limit_of_face == index]

@@ -6,9 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from manifold3d import Error, Manifold, Mesh64
+from numpy.typing import ArrayLike
 
 from explorer.motion.chains import Places
 from explorer.numerics.arrays import FloatArray
+from explorer.prototype.assembly import Prototype
 from explorer.prototype.shapes import PrototypePart
 
 
@@ -50,6 +52,13 @@ def least_gap(
                 if gap < found[0]:
                     found = (gap, parts[i].name, parts[j].name)
     return found
+
+
+def vertices_at(prototype: Prototype, position: ArrayLike, rotation: ArrayLike) -> list[FloatArray]:
+    """Return the vertices of all parts in one pose, in the base frame and design units."""
+    places = prototype.places(position, rotation)
+    each = zip(prototype.parts, places.origin, places.rotation, strict=True)
+    return [part.vertices @ turn.T + origin for part, origin, turn in each]
 
 
 def placed(

@@ -32,8 +32,9 @@ from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import OF_THE_MACHINE, SHIFTS, Box, ObjectiveName, Problem
 from explorer.statics import accuracy, compliance
 from explorer.statics.reactions import largest_accelerations, limit_shares, reactions
-from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.constraints import slacks
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
+from explorer.workspace.workspace import Workspace
 
 OBJECTIVES: tuple[ObjectiveName, ...] = (
     "smallest-reach",
@@ -163,7 +164,10 @@ def missed_demands(outcome: Outcome, count: int, seed: int = 0) -> Iterator[str]
 def _least_clearance(outcome: Outcome, count: int, rng: np.random.Generator) -> float:
     """Return the least clearance at random positions of the workspace off the singular planes."""
     design, margin = outcome.design, outcome.problem.demands.clearance_margin
-    rotation, limits = design.home_pose.rotation, constraints(design, design.home_pose.rotation)
+    rotation, limits = (
+        design.home_pose.rotation,
+        Workspace(design, design.home_pose.rotation).limits,
+    )
     longest = max(design.length_range(name)[1] for name in ("l1", "d2", "d4", "l4"))
     around = (-longest, -longest, -longest), (longest, longest, longest)
     positions = positions_of_box(design.limits.box or around, 4 * count, rng)

@@ -8,8 +8,10 @@ from functools import partial
 from unittest import mock
 
 from explorer.app.features.designs.feature import SavedDesigns
-from explorer.app.features.studies.feature import StudiesPanel
+from explorer.app.features.optimise.runner import SEARCH
+from explorer.app.features.optimise.state import Optimisation
 from explorer.app.page import Page
+from explorer.jobs.jobs import PAGE
 from explorer.page.session import clock
 from explorer.page.widgets import assigning
 
@@ -43,12 +45,12 @@ def wait_until_drawn(page: Page, timeout: float = 30.0) -> bool:
     """Wait until the newest state and all that follows are drawn; return whether they are."""
     deadline = time.monotonic() + timeout
     idle = page.session.wait_until_idle(timeout)
-    for runner in page.runners:
-        idle = idle and runner.wait_until_idle(deadline - time.monotonic())
-    # Drawing may request work of the worker, whose result is drawn again.
-    for _ in range(2):
+    while Optimisation.of(page.session.state).is_on and time.monotonic() < deadline:
+        time.sleep(0.02)
+    # Drawing may request a job, whose result is drawn again.
+    for process in (SEARCH, PAGE, PAGE):
         idle = idle and page.session.wait_until_idle(deadline - time.monotonic())
-        idle = idle and page.worker.wait_until_idle(deadline - time.monotonic())
+        idle = idle and page.jobs.wait_until_idle(deadline - time.monotonic(), process)
     return idle and page.session.wait_until_idle(deadline - time.monotonic())
 
 
@@ -61,16 +63,14 @@ def wait_until_quiet(timeout: float) -> bool:
 def settle(page: Page, timeout: float) -> bool:
     """Wait until all is drawn and no pause is pending; return whether that is so.
 
-    What waits for a pause of the user happens at once. Saved designs and studies are read on
-    threads of their own.
+    What waits for a pause of the user happens at once. Saved designs are read on a thread of their
+    own.
     """
     deadline = time.monotonic() + timeout
     services = page.services
     waits: list[Callable[[float], bool]] = [partial(wait_until_drawn, page)]
     if services.has(SavedDesigns):
         waits.append(services.get(SavedDesigns).wait_until_idle)
-    if services.has(StudiesPanel):
-        waits.append(services.get(StudiesPanel).feed.wait_until_idle)
     with mock.patch.object(assigning, "QUIET_SECONDS", 0.0):
         while all(wait(deadline - time.monotonic()) for wait in waits):
             with clock.changed:

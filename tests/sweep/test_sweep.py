@@ -48,6 +48,7 @@ from explorer.sweep.study import (
 )
 from explorer.workspace.least_clearance import node_measures
 from explorer.workspace.limits.valid_poses import violations
+from explorer.workspace.workspace import Workspace
 
 MEASURES = measures_in("studies")
 OPTIMAL = PRESETS["paper-optimal"]
@@ -233,10 +234,9 @@ def test_design_of_values_has_these_values() -> None:
 
 def nodes_of(design: Any, rotation: Any, count: int) -> Any:
     """Return the middles of the cells of a box that is measured by sampling, not asked for."""
-    from explorer.workspace.limits.constraints import constraints
     from explorer.workspace.limits.region import region_of
 
-    lows, highs = region_of(constraints(design, rotation)).ends
+    lows, highs = region_of(Workspace(design, rotation).limits).ends
     axes = [
         low + (high - low) * (np.arange(count) + 0.5) / count
         for low, high in zip(lows, highs, strict=True)
@@ -249,7 +249,7 @@ def test_node_measures_match_each_position(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     design = design.with_limits(leg_radii=(0.3, 0.2, 0.1, 0.4))
     margin = 0.5
-    found = node_measures(design, rotation, nodes=9, clearance_margin=margin)
+    found = node_measures(Workspace(design, rotation), nodes=9, clearance_margin=margin)
     nodes = nodes_of(design, rotation, 9)
     broken = violations(Configuration(design.with_limits(leg_radii=(0.0,) * 4), nodes, rotation))
     kept = nodes[[not each for each in broken]]
@@ -278,7 +278,7 @@ def test_measures_of_a_row_match_the_public_functions() -> None:
     assert rows["status"][0] == "done"
     assert found["volume"] == workspace_volume(design).volume
     assert found["reach"] == design.reach
-    nodes = node_measures(design, clearance_margin=0.05 * design.reach)
+    nodes = node_measures(Workspace(design), clearance_margin=0.05 * design.reach)
     assert found["clearance"] == min(nodes.clearances)
     assert found["clearance_24"] == nodes.clearances[4]
     assert found["margin_2"] == nodes.margins[1]

@@ -41,8 +41,8 @@ from explorer.app.state.actions import Open
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
+from explorer.jobs.executor import RESTARTED
 from explorer.mechanism.design_file import PRESETS, encode_design
-from explorer.page.session.worker import RESTARTED
 
 TABS = 3
 # Between two looks at whether the page shows its state.
@@ -367,7 +367,7 @@ class Monkey:
 
     def _kill(self) -> None:
         """Kill the worker that draws the workspace, whatever it is doing."""
-        number = self.running.page.worker.process_id
+        number = self.running.page.jobs.process_id()
         # Twice over the same work it is given up; at rest it has none.
         is_time = self._in_turn or time.monotonic() - self._killed > KILL_SECONDS
         if number is not None and is_time:

@@ -40,7 +40,7 @@ def main(count: int = COUNT, first: int = 0, poses: int = POSES) -> int:
         found = list(missed_demands(outcome, poses, seed)) if outcome.converged else []
         missed += bool(found)
         words = f"MISSED {', '.join(found)}" if found else ""
-        print(f"{seed}: {took:.1f} s, {outcome.run.message} {words}", flush=True)
+        print(f"{seed}: {took:.1f} s, {outcome.message} {words}", flush=True)
         seed += 1
     print(f"{dict(statuses)}; converged with a missed demand: {missed}")
     return missed

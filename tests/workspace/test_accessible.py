@@ -33,8 +33,9 @@ from explorer.numerics.arrays import FloatArray
 from explorer.workspace.accessible.nodes import Grid, check_start, nearest_clear_position, survey
 from explorer.workspace.accessible.radii import radius_curve, with_radius
 from explorer.workspace.least_clearance import least_clearances
-from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.slices.volume import workspace_nodes
+from explorer.workspace.limits.constraints import slacks
+from explorer.workspace.slices.volume import node_count_of
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 ROWS = (OPTIMAL, INITIAL)
@@ -65,12 +66,12 @@ def test_accessible_workspace_with_thin_legs_loses_nodes_of_the_base_plane_alone
     assert found.accessible_volume == found.volume == workspace_volume(design).volume
     assert found.solid.volume == pytest.approx(workspace_solid(design).volume, rel=1e-12)
     assert all(pair.blocked_volume == 0.0 for pair in found.pairs)
-    nodes = workspace_nodes(design)
+    nodes = node_count_of(Workspace(design))
     assert found.node_count == nodes.count
     # What the paper's grid loses are the nodes of z = 0 where axes cross.
     r, step = design.home_pose.rotation, nodes.step
     flat = np.stack(np.meshgrid(*[np.arange(-20, 21)] * 2, [0], indexing="ij"), -1) * step
-    within = (slacks(constraints(design, r), flat) >= -1e-9 * design.reach).all(axis=-1)
+    within = (slacks(Workspace(design, r).limits, flat) >= -1e-9 * design.reach).all(axis=-1)
     near = 1e-9 * design.reach
     crossing = (leg_clearances(Configuration(design, flat, r)).clearance <= near).any(axis=-1)
     assert found.node_count is not None
@@ -90,7 +91,7 @@ def test_accessible_solid_of_random_designs_holds_the_ends_of_clear_moves_alone(
     step = float(((highs - lows) / 19.0).max())
     points = np.random.default_rng(3).uniform(lows, highs, (150, 3))
     inside = np.array([solid.winding(p) > 0.5 for p in points])
-    limits = constraints(design, r)
+    limits = Workspace(design, r).limits
     slack = slacks(limits, points).min(axis=-1)
     clearance = leg_clearances(Configuration(design, points, r)).clearance.min(axis=-1)
     assert (slack[inside] > -2.0 * solid.tolerance).all()
@@ -111,7 +112,7 @@ def test_accessible_volume_agrees_with_random_positions(design: Design, radius: 
     rng = np.random.default_rng(5)
     lows, highs = design.limits.box or (-design.reach, design.reach)
     points = rng.uniform(lows, highs, (100_000, 3))
-    points = points[(slacks(constraints(design, r), points) >= 0.0).all(axis=-1)]
+    points = points[(slacks(Workspace(design, r).limits, points) >= 0.0).all(axis=-1)]
     clear = (leg_clearances(Configuration(design, points, r)).clearance > 0.0).all(axis=-1)
     # In these designs everything that is clear hangs together.
     share, error = clear.mean(), clear.std() / math.sqrt(len(points))
@@ -154,7 +155,9 @@ def test_accessible_workspace_within_empty_limits_is_empty() -> None:
     assert found.volume == found.accessible_volume == found.accessible_node_count == 0
     assert found.solid.is_empty
     assert found.solid.empty_because
-    assert radius_curve(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1))).volumes.tolist() == [0.0]
+    assert radius_curve(
+        Workspace(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1)))
+    ).volumes.tolist() == [0.0]
 
 
 HUNDREDTH = 0.01 * OPTIMAL.reach
@@ -180,16 +183,18 @@ def test_accessible_workspace_from_an_invalid_home_names_cause_and_remedy(
 def test_nearest_clear_position_has_no_nearer_one() -> None:
     r = OPTIMAL.home_pose.rotation
     above = np.array([10.0, 5.0, 19.0])
-    assert nearest_clear_position(OPTIMAL, r, above) == pytest.approx([10.0, 5.0, 18.0], abs=1e-4)
+    assert nearest_clear_position(Workspace(OPTIMAL, r), above) == pytest.approx(
+        [10.0, 5.0, 18.0], abs=1e-4
+    )
     design, low = thick(OPTIMAL, 0.01), np.array([10.0, -8.0, 0.3])
-    found = nearest_clear_position(design, r, low)
+    found = nearest_clear_position(Workspace(design, r), low)
     assert found is not None
-    check_start(design, r, found)
+    check_start(Workspace(design, r), found)
     best = float(np.linalg.norm(found - low))
     rng = np.random.default_rng(3)
     others = low + 0.98 * best * rng.uniform(-1.0, 1.0, (10_000, 3))
     others = others[np.linalg.norm(others - low, axis=1) < 0.98 * best]
-    kept = (slacks(constraints(design, r), others) >= 0.0).all(axis=-1)
+    kept = (slacks(Workspace(design, r).limits, others) >= 0.0).all(axis=-1)
     assert not (
         kept & (leg_clearances(Configuration(design, others, r)).clearance > 0.0).all(axis=-1)
     ).any()
@@ -207,7 +212,7 @@ def test_accessible_nodes_are_a_component_of_clear_steps() -> None:
     design, r = thick(INITIAL, 0.02), INITIAL.home_pose.rotation
     home = np.array(design.home_pose.position)
     grid = Grid(home - 4.5, np.full(3, 1.5), (7, 7, 7))
-    found = survey(design, r, grid)
+    found = survey(Workspace(design, r), grid)
     reached = found.accessible_from(home)
     nodes = grid.positions.reshape(-1, 3)
     # All steps again, each by itself, and a search over them from the home's node.
@@ -224,12 +229,12 @@ def test_accessible_nodes_are_a_component_of_clear_steps() -> None:
 def test_least_clearances_below_a_demand_are_those_of_all_positions(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     design, demand = limited(design, swing=Swing(a1=50.0, b3=70.0)), 0.05 * design.reach
-    every = least_clearances(design, rotation)
-    found = least_clearances(design, rotation, 0.1 * demand, below=demand)
+    every = least_clearances(Workspace(design, rotation))
+    found = least_clearances(Workspace(design, rotation), 0.1 * demand, below=demand)
     assert np.isfinite(found.clearance[every.clearance < 0.89 * demand]).all()
     assert np.isinf(found.clearance[every.clearance > demand]).all()
     is_near = np.isfinite(found.clearance)
-    assert (slacks(constraints(design, rotation), found.position[is_near]) >= 0.0).all()
+    assert (slacks(Workspace(design, rotation).limits, found.position[is_near]) >= 0.0).all()
     assert found.clearance[is_near] == pytest.approx(every.clearance[is_near], abs=0.11 * demand)
 
 
@@ -237,9 +242,9 @@ def test_least_clearances_below_a_demand_are_those_of_all_positions(seed: int) -
 def test_least_clearances_at_random_positions_hold(design: Design, margin: float) -> None:
     design = limited(design, margin=margin, leg_radii=(0.1, 0.2, 0.3, 0.4))
     r = design.home_pose.rotation
-    found = least_clearances(design)
+    found = least_clearances(Workspace(design))
     assert (found.bound <= found.clearance).all()
-    limits = constraints(design, r)
+    limits = Workspace(design, r).limits
     assert (slacks(limits, found.position) >= -1e-8 * design.reach).all()
     own = leg_clearances(Configuration(design, found.position, r)).clearance
     # Axes that are as good as crossing are said to cross.
@@ -260,7 +265,7 @@ def test_least_clearances_have_the_same_last_digits_with_any_number_of_threads()
         found: list[list[float]] = []
         for count in (1, 2, 4):
             with threadpool_limits(count, "blas"):
-                least = least_clearances(design, margin=0.5)
+                least = least_clearances(Workspace(design), margin=0.5)
             found.append([*least.clearance.tolist(), *least.position.ravel().tolist()])
         assert found[0] == found[1] == found[2]
 
@@ -284,7 +289,7 @@ def test_distance_gradients_agree_with_finite_differences() -> None:
 
 @pytest.mark.parametrize("design", long_after(1, ROWS))
 def test_radius_curve_agrees_with_solids(design: Design) -> None:
-    curve = radius_curve(design)
+    curve = radius_curve(Workspace(design))
     exact = workspace_volume(design).volume
     assert curve.volumes[0] == pytest.approx(exact, rel=5e-3)
     assert (np.diff(curve.volumes) <= 0.0).all()
@@ -299,7 +304,7 @@ def test_radius_curve_agrees_with_solids(design: Design) -> None:
 
 def test_harmless_radius_blocks_nothing_and_a_larger_one_does() -> None:
     design = limited(OPTIMAL, margin=1.0)
-    curve = radius_curve(design, cells=20)
+    curve = radius_curve(Workspace(design), cells=20)
     assert 0.0 < curve.harmless_bound <= curve.harmless
     under, over = (with_radius(design, share * curve.harmless) for share in (0.98, 1.5))
     untouched = accessible_workspace(under)

@@ -38,9 +38,10 @@ from explorer.statics.load_cases import largest_shares as shares_of_case, load_c
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, limit_shares
 from explorer.workspace.carried_region import carried_region
-from explorer.workspace.limits.constraints import constraints, satisfies, slacks
+from explorer.workspace.limits.constraints import slacks
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 from explorer.workspace.nearest_carrying import nearest_carrying_pose
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 REFERENCE: list[dict[str, Any]] = read_reference("held")["held"]
@@ -76,7 +77,7 @@ def largest_shares(
 @pytest.mark.parametrize("case", long_after(2, SHEETS_LAST), ids=lambda case: str(case["name"]))
 def test_volume_is_that_of_reference_cases(case: dict[str, Any]) -> None:
     design = decode_design(json.dumps(case["design"]).encode(), "the reference")
-    part = carried_region(design, case["rotation"], case["load"])
+    part = carried_region(Workspace(design, case["rotation"]), tuple(case["load"]))
     assert part.volume == pytest.approx(case["volume"], rel=1e-3)
     error = 3.0 * case["error"] + 0.005 * case["held_volume"]
     assert part.held_volume == pytest.approx(case["held_volume"], abs=error)
@@ -103,11 +104,11 @@ def test_volume_at_any_orientation_is_that_of_positions_in_the_mode_of_home(seed
             home = Pose.of(home.position, rotation)
         design = msgspec.structs.replace(design, home=home)
         whole = workspace_solid(design, rotation)
-    part = carried_region(design, rotation, load)
+    part = carried_region(Workspace(design, rotation), tuple(load.tolist()))
     at = rng.uniform(whole.vertices.min(axis=0), whole.vertices.max(axis=0), (400_000, 3))
     signs = np.sign(margins(home.position, home.rotation))
     at = at[(np.sign(margins(at, rotation)) == signs).all(axis=1)]
-    at = at[satisfies(design, constraints(design, rotation), at).all(axis=1)]
+    at = at[Workspace(design, rotation).satisfies(at).all(axis=1)]
     assert len(at) > 10_000
     share = float((largest_shares(design, at, load, rotation) <= 1.0).mean())
     sampling = 3.0 * math.sqrt(share * (1.0 - share) / len(at))
@@ -119,7 +120,7 @@ def test_volume_at_any_orientation_is_that_of_positions_in_the_mode_of_home(seed
 @pytest.mark.parametrize("name", ["bending", "all parts"])
 def test_new_faces_lie_where_a_part_takes_its_limit(name: str) -> None:
     design = CASES[name]
-    solid = carried_region(design).solid
+    solid = carried_region(Workspace(design)).solid
     # A force of any direction alone asks as much of pull as of push, and has one face.
     assert len(solid.faces) < 25_000
     parts = [index for index, limit in enumerate(solid.limits) if limit in PART_NAMES]
@@ -151,16 +152,16 @@ UNBOUNDED = msgspec.structs.replace(
 )
 def test_thin_and_long_parts_are_found_whole(force: float, error: float) -> None:
     """The volume is that of random positions, and only limits and parts bound it."""
-    load = np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0])
-    part = carried_region(UNBOUNDED, load=load)
+    load = (0.0, 0.0, -force, 0.0, 0.0, 0.0)
+    part = carried_region(Workspace(UNBOUNDED), load=load)
     signed = msgspec.structs.replace(UNBOUNDED, limits=Limits(margin=0.0))
     rotation = UNBOUNDED.home_pose.rotation
-    limits = constraints(signed, rotation)
+    limits = Workspace(signed, rotation).limits
     whole = workspace_solid(signed, rotation)
     lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
     at = np.random.default_rng(7).uniform(lows, highs, (COUNT, 3))
     at = at[(slacks(limits, at) >= 0.0).all(axis=-1)]
-    is_held = shares_of_case(load_case(signed, rotation, load), rotation, at)[0] <= 1.0
+    is_held = shares_of_case(load_case(signed, rotation, np.array(load)), rotation, at)[0] <= 1.0
     box = math.prod((highs - lows).tolist())
     share = int(is_held.sum()) / COUNT
     sampling = box * math.sqrt(share * (1.0 - share) / COUNT)
@@ -180,7 +181,7 @@ def test_thin_and_long_parts_are_found_whole(force: float, error: float) -> None
 @pytest.mark.parametrize("moment", [3.0, 5.0])
 def test_faces_have_the_name_of_the_smaller_limit_of_the_moment(moment: float) -> None:
     design = msgspec.structs.replace(CASES["bending"], guide=Guide(moment_nm=moment))
-    solid = carried_region(design).solid
+    solid = carried_region(Workspace(design)).solid
     used = {solid.limits[int(index)] for index in np.unique(solid.limit_of_face)}
     is_of_guide = moment == 3.0
     names = PART_NAMES[10:] if is_of_guide else PART_NAMES[6:8]
@@ -194,7 +195,7 @@ def test_load_that_nothing_holds_names_the_part() -> None:
     design = msgspec.structs.replace(
         OPTIMAL, payload=Payload(500.0), actuators=Actuators(push_n=(1.0, 1.0, 1.0, 1.0, 1.0, 1.0))
     )
-    part = carried_region(design)
+    part = carried_region(Workspace(design))
     assert part.held_volume == 0.0
     assert part.solid.is_empty
     assert part.solid.empty_because[0] in PART_NAMES
@@ -202,13 +203,13 @@ def test_load_that_nothing_holds_names_the_part() -> None:
 
 @pytest.mark.long
 def test_without_limits_the_whole_holds_any_load() -> None:
-    part = carried_region(OPTIMAL, load=LOAD)
+    part = carried_region(Workspace(OPTIMAL), load=LOAD)
     assert part.held_volume == pytest.approx(part.volume, rel=1e-12)
 
 
 def test_bad_input_is_refused() -> None:
     with pytest.raises(InputError, match="load"):
-        carried_region(OPTIMAL, load=(np.nan,) * 6)
+        carried_region(Workspace(OPTIMAL), load=(np.nan,) * 6)
 
 
 HOME = OPTIMAL.home_pose

@@ -14,7 +14,8 @@ from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.clearance_bounds import LEGS_OF_PAIRS, bound_slacks, raise_bounds
 from explorer.workspace.least_clearance import least_clearances
-from explorer.workspace.limits.constraints import Cone, Constraint, constraints, slacks
+from explorer.workspace.limits.constraints import Cone, Constraint, slacks
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -45,7 +46,7 @@ def test_no_position_in_a_cell_and_the_limits_is_below_the_bounds(seed: int) -> 
     rng = np.random.default_rng(seed)
     design, rotation = ordinary_case(seed) if seed % 2 else troubled_case(seed)
     r = design.home_pose.rotation if rotation is None else rotation
-    limits, apart = constraints(design, r), ~joined_pairs(design)
+    limits, apart = Workspace(design, r).limits, ~joined_pairs(design)
     middles = design.reach * rng.uniform(-1.0, 1.0, (300, 3))
     half = design.reach * 10.0 ** rng.uniform(-3.0, -0.5) * rng.uniform(0.2, 1.0, 3)
     low = bounds_of(design, r, limits, middles, half)
@@ -81,8 +82,8 @@ def test_error_of_the_bounds_falls_with_the_square_of_the_cell() -> None:
 def test_bound_at_a_limit_that_holds_a_distance_is_nearly_the_distance() -> None:
     # Legs 3 and 4 come nearest where δ2, or the box, lets them go no farther.
     design, r = limited(OPTIMAL, margin=0.5), OPTIMAL.home_pose.rotation
-    least = least_clearances(design, tolerance=1e-6)
-    limits, half = constraints(design, r), np.full(3, 1e-3)
+    least = least_clearances(Workspace(design), tolerance=1e-6)
+    limits, half = Workspace(design, r).limits, np.full(3, 1e-3)
     held = bounds_of(design, r, limits, least.position, half)
     free = bounds_of(design, r, (), least.position, half)
     distance = least.clearance
@@ -92,5 +93,5 @@ def test_bound_at_a_limit_that_holds_a_distance_is_nearly_the_distance() -> None
 
 def test_least_clearances_are_certain_where_joints_bound_the_swing_of_legs() -> None:
     swing = Swing(a1=30.0, b2=45.0, b3=35.0, b4=35.0)
-    least = least_clearances(limited(OPTIMAL, margin=0.5, swing=swing))
+    least = least_clearances(Workspace(limited(OPTIMAL, margin=0.5, swing=swing)))
     assert (least.clearance - least.bound <= 1e-4 * OPTIMAL.reach).all()

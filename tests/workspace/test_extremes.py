@@ -36,10 +36,10 @@ from explorer.workspace.limits.constraints import (
     Cone,
     Constraint,
     HalfSpace,
-    constraints,
     slacks,
 )
 from explorer.workspace.limits.region import region_of
+from explorer.workspace.workspace import Workspace
 
 CORNERS = np.array([*itertools.product((-0.5, 0.5), repeat=3)])
 STALLING = [
@@ -179,13 +179,13 @@ def size_of(limits: tuple[Constraint, ...]) -> float:
 @pytest.mark.parametrize("case", SEEDS)
 def test_extent_is_reached_and_nothing_lies_beyond(case: tuple[str, int]) -> None:
     design, rotation = at_home(*CASES[case[0]](case[1]))
-    limits = constraints(design, rotation)
-    ends = extent_of(design, rotation)
+    limits = Workspace(design, rotation).limits
+    ends = extent_of(Workspace(design, rotation))
     if ends is None:
         assert is_proven_empty(limits, 1e-5 * size_of(limits))
         return
     size = size_of(limits)
-    points = extreme_positions(design, rotation, NO_NORMALS)
+    points = extreme_positions(Workspace(design, rotation), NO_NORMALS)
     units = [1.0 if isinstance(limit, Cone) else size for limit in limits]
     assert (slacks(limits, points) >= -1e-10 * np.array(units)).all()
     for axis, end in ((axis, end) for axis in range(3) for end in (0, 1)):
@@ -199,13 +199,15 @@ def test_extent_is_reached_and_nothing_lies_beyond(case: tuple[str, int]) -> Non
 def test_least_margins_are_reached_and_none_is_less(case: tuple[str, int]) -> None:
     design, rotation = at_home(*CASES[case[0]](case[1]))
     design = limited(design, margin=None if case[1] % 2 else design.limits.margin)
-    limits, gradients = constraints(design, rotation), planes_of_singularity(rotation)
-    least = least_margins(design, rotation)
-    assert (least is None) == (extent_of(design, rotation) is None)
+    limits, gradients = Workspace(design, rotation).limits, planes_of_singularity(rotation)
+    least = least_margins(Workspace(design, rotation))
+    assert (least is None) == (extent_of(Workspace(design, rotation)) is None)
     if least is None:
         return
     size = size_of(limits)
-    reached = np.abs(extreme_positions(design, rotation, gradients) @ gradients.T).min(axis=0)
+    reached = np.abs(extreme_positions(Workspace(design, rotation), gradients) @ gradients.T).min(
+        axis=0
+    )
     np.testing.assert_allclose(least, reached, atol=1e-10 * design.reach)
     demanded = design.limits.margin or 0.0
     for gradient, value in zip(gradients, least.tolist(), strict=True):
@@ -223,11 +225,11 @@ def test_extents_and_least_margins_of_scaled_designs_are_exact(
 ) -> None:
     """On the meshes of these designs a descent stalls before it is at the lowest position."""
     case = Case(scaled_design(design, factor))
-    lows, highs = np.array(extent_of(design, design.home_pose.rotation))
+    lows, highs = np.array(extent_of(Workspace(design, design.home_pose.rotation)))
     assert lows[2] == pytest.approx(lowest, abs=2e-8 * design.reach)
     near = 1e-9 * design.reach
     np.testing.assert_allclose(case.extent / factor, highs - lows, atol=near)
-    least, more = (least_margins(each, case.rotation) for each in (design, case.design))
+    least, more = (least_margins(Workspace(each, case.rotation)) for each in (design, case.design))
     assert least is not None
     assert more is not None
     np.testing.assert_allclose(more / factor, least, rtol=0.0, atol=near)
@@ -247,9 +249,12 @@ def test_extent_of_ball_cut_at_its_top_is_that_of_the_cut() -> None:
             d4=(0.0, 9.0),
             box=((-2.0, 3.0, 1.0 - height), (2.0, 7.0, 2.0)),
         )
-        ends = extent_of(cut, quarter)
+        ends = extent_of(Workspace(cut, quarter))
         assert ends is not None
         wide = math.sqrt(height * (2.0 - height))
         np.testing.assert_allclose(ends[0], [-wide, 5.0 - wide, 1.0 - height], atol=1e-8)
         np.testing.assert_allclose(ends[1], [wide, 5.0 + wide, 1.0], atol=1e-8)
-    assert extent_of(limited(design, box=((-2.0, 3.0, 1.1), (2.0, 7.0, 2.0))), quarter) is None
+    assert (
+        extent_of(Workspace(limited(design, box=((-2.0, 3.0, 1.1), (2.0, 7.0, 2.0))), quarter))
+        is None
+    )

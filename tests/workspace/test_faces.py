@@ -11,16 +11,16 @@ from limited_designs import ordinary_case, thin_case
 from explorer import PRESETS
 from explorer.mechanism.design import Design, Swing
 from explorer.numerics.arrays import FloatArray, dot
-from explorer.workspace.faces.faces import Faces, workspace_faces
+from explorer.workspace.faces.faces import Faces, faces_within
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
     Constraint,
     HalfSpace,
-    constraints,
 )
 from explorer.workspace.solids.solid import Solid, cut_solid
 from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 # Pixels across the diagonal of a workspace that fills a page of 1440 x 900.
@@ -42,9 +42,9 @@ CASES = (*PRESET_CASES, at_home(coned()), *(ordinary_case(seed) for seed in rang
 def faces_of(
     design: Design, rotation: FloatArray, *more: Constraint
 ) -> tuple[Faces, tuple[Constraint, ...], Solid]:
-    limits = (*constraints(design, rotation), *more)
+    limits = (*Workspace(design, rotation).limits, *more)
     solid = workspace_solid(design, rotation, 2e-3 * design.reach)
-    return workspace_faces(limits), limits, solid
+    return faces_within(limits), limits, solid
 
 
 def size_of(faces: Faces) -> float:
@@ -163,7 +163,7 @@ def test_cone_of_a_joint_has_a_face(half_angle: float, flat: bool) -> None:
     ball = BallOrCylinder("ball", np.zeros(3), 2.0, is_ball=True, inside=True)
     axis = np.array([0.0, 0.6, 0.8])
     cone = Cone("cone", np.zeros(3), axis, half_angle, flat)
-    faces = workspace_faces([ball, cone])
+    faces = faces_within([ball, cone])
     found = areas(faces)
     # Half of a disc on either side of a wedge; the cone over a circle of the ball.
     expected = 4.0 * np.pi if flat else 4.0 * np.pi * np.sin(half_angle)

@@ -26,7 +26,7 @@ from explorer.mechanism.folds import from_folds, to_folds
 from explorer.mechanism.margins import signs_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import UNITS, Unit
-from explorer.workspace.limits.constraints import Cone, constraints, slacks
+from explorer.workspace.limits.constraints import Cone, slacks
 from explorer.workspace.limits.table import demands_of
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import (
@@ -36,6 +36,7 @@ from explorer.workspace.limits.valid_poses import (
     poses_are_valid,
     violations,
 )
+from explorer.workspace.workspace import Workspace
 
 Signs = tuple[int, int, int]
 ANY: dict[str, Any] = dict.fromkeys(LENGTHS, (0.0, 1e6))
@@ -165,7 +166,7 @@ def test_violated_limits_are_those_of_the_solids_and_of_validity(seed: int) -> N
     turn = Rotation.from_rotvec(spread * rng.normal(size=3)).as_matrix()
     rotation = turn @ home.rotation
     position = np.array(home.position) + spread * design.reach * rng.normal(size=3)
-    solids = constraints(design, rotation)
+    solids = Workspace(design, rotation).limits
     slack, size = slacks(solids, position), max(design.reach, float(np.abs(position).max()))
     # Close to a surface rounding decides.
     if (np.abs(slack) <= 1e-9 * np.where([isinstance(s, Cone) for s in solids], 1.0, size)).any():

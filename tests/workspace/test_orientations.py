@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from explorer import PRESETS, Design, InputError, Limits, Pose, evaluate, margins
 from explorer.mechanism.design import LENGTHS, Swing, Triple
 from explorer.mechanism.pose import rotation_array, yaw_pitch_roll_from_rotation
-from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.limits.valid_poses import Violation
 from explorer.workspace.orientations.share import (
@@ -26,7 +25,8 @@ from explorer.workspace.orientations.share import (
     orientations_within,
     yaw_pitch_roll_range,
 )
-from explorer.workspace.slices.volume import volume_of
+from explorer.workspace.slices.volume import region_volume
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose
@@ -145,9 +145,9 @@ def test_orientations_with_reversed_ranges_or_unusable_counts_are_refused() -> N
 
 def test_volume_of_too_many_surfaces_is_refused() -> None:
     rotations = cone_of_directions(HOME.rotation, 10.0, 33)
-    limits = [limit for rotation in rotations for limit in constraints(OPTIMAL, rotation)]
+    limits = [limit for rotation in rotations for limit in Workspace(OPTIMAL, rotation).limits]
     with pytest.raises(InputError, match="a volume takes at most 32 surfaces; the region has"):
-        volume_of(region_of(limits))
+        region_volume(region_of(limits))
 
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")

@@ -26,6 +26,7 @@ from explorer.workspace.position_bands import (
     is_unstated,
     position_bands,
 )
+from explorer.workspace.workspace import Workspace
 
 MEASURES: tuple[PositionMeasure, ...] = tuple(MEASURE_WORDS)
 DISPLACEMENTS: tuple[PositionMeasure, ...] = ("error", "deflection")
@@ -41,6 +42,7 @@ LOADED = msgspec.structs.replace(
     limits=Limits(box=((0.0, -12.0, -10.0), (20.0, 22.0, 18.0)), margin=None),
 )
 LOAD = np.array([4.0, -3.0, -6.0, 5.0, 10.0, -5.0])
+SIX = tuple(LOAD.tolist())
 ORIENTATIONS = [
     OPTIMAL.home_pose.rotation,
     *(rotation_from_yaw_pitch_roll(angles) for angles in ((-40, 25, 10), (-120, -35, 60))),
@@ -130,7 +132,9 @@ def softness_of(design: Design, points: FloatArray, rotation: FloatArray) -> Flo
 def test_values_are_reciprocal_to_what_reactions_ask(
     measure: PositionMeasure, rotation: FloatArray
 ) -> None:
-    bands = position_bands(LOADED, rotation, measure, warn_below=1.0, load=LOAD)
+    bands = position_bands(
+        Workspace(LOADED, rotation), measure, warn_below=1.0, load=tuple(LOAD.tolist())
+    )
     points = near_planes(rotation, 1000)
     # The last ones lie on the singular planes.
     points[-3:] = [on_plane(normal) for normal in planes_of_singularity(rotation)]
@@ -156,7 +160,9 @@ def test_displacement_of_a_tool_on_the_singular_axis_is_bounded_beside_the_plane
     """Where δ1 vanishes the platform turns about b2b3, which moves no point on that line."""
     rotation = ORIENTATIONS[1]
     design = msgspec.structs.replace(LOADED, tool=Tool(), payload=Payload())
-    bands = position_bands(design, rotation, measure, warn_below=1.0, load=np.eye(6)[2] * 50.0)
+    bands = position_bands(
+        Workspace(design, rotation), measure, warn_below=1.0, load=(0.0, 0.0, 50.0, 0.0, 0.0, 0.0)
+    )
     normal = planes_of_singularity(rotation)[0]
     beside = on_plane(normal) + np.outer([-1e-3, -1e-6, 0.0, 1e-6, 1e-3], normal)
     values = bands.values(beside)
@@ -179,11 +185,13 @@ def test_measures_are_unstated_where_a_design_is_ideal() -> None:
     point, rotation = np.array([[10.0, 5.0, 9.0]]), ORIENTATIONS[0]
     for measure in MEASURES:
         # Nothing is asked where nothing loads.
-        empty = position_bands(OPTIMAL, rotation, measure, warn_below=1.0)
+        empty = position_bands(Workspace(OPTIMAL, rotation), measure, warn_below=1.0)
         assert (empty.values(point) > empty.edges[-1]).all()
         needs = measure in ("share", *DISPLACEMENTS)
         assert is_unstated(OPTIMAL, measure) == needs
-        bands = position_bands(OPTIMAL, rotation, measure, warn_below=1.0, load=LOAD)
+        bands = position_bands(
+            Workspace(OPTIMAL, rotation), measure, warn_below=1.0, load=tuple(LOAD.tolist())
+        )
         assert (bands.values(point)[0] > bands.edges[-1]) == needs
         for name, design in stated.items():
             assert is_unstated(design, measure) == (needs and not name.startswith(measure))
@@ -193,8 +201,12 @@ def test_measures_are_unstated_where_a_design_is_ideal() -> None:
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 3e4])
 def test_levels_of_forces_are_round_numbers_that_suit_the_load(factor: float) -> None:
     rotation = ORIENTATIONS[0]
-    bands = position_bands(OPTIMAL, rotation, "force", warn_below=1.0, load=factor * LOAD)
-    shares = position_bands(LOADED, rotation, "share", warn_below=1.0, load=factor * LOAD)
+    bands = position_bands(
+        Workspace(OPTIMAL, rotation), "force", warn_below=1.0, load=tuple((factor * LOAD).tolist())
+    )
+    shares = position_bands(
+        Workspace(LOADED, rotation), "share", warn_below=1.0, load=tuple((factor * LOAD).tolist())
+    )
     assert shares.levels[:0:-1] == SHARES
     assert np.isinf(bands.levels[0])
     levels = bands.levels[:0:-1]

@@ -12,10 +12,11 @@ from limited_designs import limited, ordinary_case, reference_case
 import explorer
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.constraints import slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.outline import Edge, Outline, level_loops, slice_outline
 from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 LEVELS = 60
@@ -47,7 +48,7 @@ def in_space(axis: str, level: float, points: FloatArray) -> FloatArray:
 
 
 def extent(design: explorer.Design, rotation: FloatArray, axis: str) -> tuple[float, float]:
-    lows, highs = region_of(constraints(design, rotation)).ends
+    lows, highs = region_of(Workspace(design, rotation).limits).ends
     return float(lows["xyz".index(axis)]), float(highs["xyz".index(axis)])
 
 
@@ -58,7 +59,8 @@ def test_outline_areas_over_levels_integrate_to_the_exact_volume(seed: int, axis
     low, high = extent(design, rotation, axis)
     step = (high - low) / LEVELS
     outlines = [
-        slice_outline(design, rotation, axis, low + (k + 0.5) * step) for k in range(LEVELS)
+        slice_outline(Workspace(design, rotation), axis, low + (k + 0.5) * step)
+        for k in range(LEVELS)
     ]
     areas = [area_of(outline) for outline in outlines if outline is not None]
     assert len(areas) == LEVELS
@@ -70,12 +72,12 @@ def test_outline_areas_over_levels_integrate_to_the_exact_volume(seed: int, axis
 @pytest.mark.parametrize(("seed", "axis"), [(0, "x"), (1, "y"), (2, "z")])
 def test_outline_edges_lie_on_their_limits_and_close(seed: int, axis: str) -> None:
     design, rotation = ordinary_case(100 + seed)
-    limits = constraints(design, rotation)
+    limits = Workspace(design, rotation).limits
     low, high = extent(design, rotation, axis)
     shares = np.linspace(0.0, 1.0, 7)
     seen = 0
     for level in np.linspace(low, high, 13)[1:-1].tolist():
-        outline = slice_outline(design, rotation, axis, level)
+        outline = slice_outline(Workspace(design, rotation), axis, level)
         assert outline is not None
         for loop in outline:
             for edge, after in zip(loop, (*loop[1:], loop[0]), strict=True):
@@ -92,9 +94,9 @@ def test_outline_edges_lie_on_their_limits_and_close(seed: int, axis: str) -> No
 @pytest.mark.parametrize("seed", range(2))
 def test_outline_edges_have_the_slice_on_their_left(seed: int) -> None:
     design, rotation = ordinary_case(200 + seed)
-    limits = constraints(design, rotation)
+    limits = Workspace(design, rotation).limits
     level = design.home.position[2] if design.home else 0.0
-    outline = slice_outline(design, rotation, "z", level)
+    outline = slice_outline(Workspace(design, rotation), "z", level)
     assert outline is not None
     assert outline
     for edge in (edge for loop in outline for edge in loop):
@@ -109,13 +111,13 @@ def test_outline_edges_have_the_slice_on_their_left(seed: int) -> None:
 def test_outline_outside_a_workspace_has_no_loops() -> None:
     rotation = OPTIMAL.home_pose.rotation
     for r, level in ((rotation, 30.0), (rotation, -0.1), (np.eye(3), 9.0)):
-        assert slice_outline(OPTIMAL, r, "z", level) == ()
+        assert slice_outline(Workspace(OPTIMAL, r), "z", level) == ()
 
 
 def test_outline_with_cones_is_none() -> None:
     swung = limited(OPTIMAL, swing=Swing(a1=60.0))
     rotation = OPTIMAL.home_pose.rotation
-    assert slice_outline(swung, rotation, "z", 9.0) is None
+    assert slice_outline(Workspace(swung, rotation), "z", 9.0) is None
 
 
 def area(polygon: FloatArray) -> float:

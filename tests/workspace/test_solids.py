@@ -29,11 +29,12 @@ from explorer import PRESETS, Design, ExplorerError, InputError, Limits, Pose, p
 from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints
+from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 from explorer.workspace.orientations.share import cone_of_directions
 from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.solids.solid import HULL, carved_solid, convex_hull, cut_solid
 from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -83,7 +84,7 @@ def test_solid_of_quarter_turns_ends_at_its_margins(seed: int) -> None:
 def lens(depth: float) -> tuple[Design, float]:
     """Return a design whose workspace is a lens of two balls with a depth, and its volume."""
     bare = free(OPTIMAL)
-    balls = constraints(bare, bare.home_pose.rotation)
+    balls = Workspace(bare, bare.home_pose.rotation).limits
     one, other = (x.centre for x in balls if isinstance(x, BallOrCylinder) and x.is_ball)
     apart = float(np.linalg.norm(one - other))
     r, s = 0.4 * apart, 0.6 * apart + depth

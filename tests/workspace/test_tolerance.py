@@ -41,11 +41,12 @@ from explorer.mechanism.design import LENGTHS, Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import SHIFTS, Box
-from explorer.workspace.limits.constraints import Never, angle_between, constraints, slacks
+from explorer.workspace.limits.constraints import Never, angle_between, slacks
 from explorer.workspace.limits.table import CARRIAGE_ORDER
 from explorer.workspace.orientations.share import orientations_within
-from explorer.workspace.slices.volume import workspace_nodes
+from explorer.workspace.slices.volume import node_count_of
 from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -126,7 +127,7 @@ def boxed(design: Design, lows: FloatArray, highs: FloatArray) -> Design:
 def answers_of(design: Design, pose: Pose) -> dict[str, bool]:
     """Return by part of the explorer whether a pose on a node of step 1 satisfies the limits."""
     place, turn = np.array(pose.position), pose.rotation
-    left = slacks(constraints(design, turn), place)
+    left = slacks(Workspace(design, turn).limits, place)
     around = limited(design, box=design.limits.box or box_between(place - 1.0, place + 1.0))
     return {
         "limits of a pose": not evaluate(design, pose).violations,
@@ -148,7 +149,7 @@ def has_node(design: Design, place: FloatArray, rotation: FloatArray) -> bool:
     only = boxed(design, np.maximum(lows, place - 0.25), np.minimum(highs, place + 0.25))
     if (np.array(only.limits.box)[0] > np.array(only.limits.box)[1]).any():
         return False
-    return workspace_nodes(only, rotation, 1.0).count == 1
+    return node_count_of(Workspace(only, rotation), 1.0).count == 1
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -218,7 +219,7 @@ def test_order_with_d3_less_d1_of_the_other_sign_than_at_home_is_a_violation(see
         names = [each.limit for each in evaluate(only, pose).violations]
         assert names == ([CARRIAGE_ORDER] if broken else [])
         assert not evaluate(plain, pose).violations
-        never = [each.name for each in constraints(only, rotation) if isinstance(each, Never)]
+        never = [each.name for each in Workspace(only, rotation).limits if isinstance(each, Never)]
         assert never == names
 
 
@@ -226,11 +227,11 @@ def test_workspace_with_the_carriages_in_the_other_order_is_empty() -> None:
     design = limited(OPTIMAL, margin=None)
     found = workspace_volume(design, MIRRORED)
     assert (found.volume, found.empty_because) == (0.0, (CARRIAGE_ORDER,))
-    assert workspace_nodes(design, MIRRORED).count == 0
+    assert node_count_of(Workspace(design, MIRRORED)).count == 0
     assert workspace_solid(design, MIRRORED).empty_because == (CARRIAGE_ORDER,)
     plain = limited(design, carriage_order="any")
     assert workspace_volume(plain, MIRRORED).volume > 1000.0
-    assert workspace_nodes(plain, MIRRORED).count > 100
+    assert node_count_of(Workspace(plain, MIRRORED)).count > 100
 
 
 def yawed(yaw: float) -> Pose:

@@ -32,7 +32,7 @@ from explorer import PRESETS, Design, InputError
 from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.constraints import YAW, constraints
+from explorer.workspace.limits.constraints import YAW
 from explorer.workspace.limits.region import column_lengths, region_of
 from explorer.workspace.slices.integration import (
     RESULTS,
@@ -41,7 +41,9 @@ from explorer.workspace.slices.integration import (
     integrate_slices,
     quadrature,
 )
-from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import node_count_of, workspace_volume
+from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -56,7 +58,7 @@ def test_volume_of_reference_workspaces_is_theirs(index: int) -> None:
 
 @pytest.mark.parametrize("row", REFERENCE["table1"], ids=lambda row: str(row["name"]))
 def test_volume_and_nodes_of_table_1_rows_are_the_reference_ones(row: dict[str, Any]) -> None:
-    nodes = workspace_nodes(PRESETS[row["name"]])
+    nodes = node_count_of(Workspace(PRESETS[row["name"]]))
     found = workspace_volume(PRESETS[row["name"]]).volume
     assert found == pytest.approx(row["exact_volume"], rel=1e-6)
     assert nodes.count == row["node_count"]
@@ -69,10 +71,12 @@ def test_volume_and_nodes_of_table_1_rows_are_the_reference_ones(row: dict[str, 
 def test_nodes_counted_satisfy_every_limit(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     step = 0.7
-    nodes = workspace_nodes(design, rotation, step)
+    nodes = node_count_of(Workspace(design, rotation), step)
     index = np.stack(np.meshgrid(*[np.arange(-45.0, 46.0)] * 3, indexing="ij"), axis=-1)
     grid = np.asarray(step * index.reshape(-1, 3), dtype=np.float64)
-    kept = np.all([limit.slack(grid) >= 0.0 for limit in constraints(design, rotation)], axis=0)
+    kept = np.all(
+        [limit.slack(grid) >= 0.0 for limit in Workspace(design, rotation).limits], axis=0
+    )
     assert nodes.count == int(kept.sum())
     if nodes.extent is not None:
         inside = grid[kept]
@@ -82,7 +86,7 @@ def test_nodes_counted_satisfy_every_limit(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_volume_is_the_sum_of_columns(seed: int) -> None:
     design, rotation = ordinary_case(seed)
-    region, many = region_of(constraints(design, rotation)), 500
+    region, many = region_of(Workspace(design, rotation).limits), 500
     assert len(region.cones) == 0
     lows, highs = region.ends
     total = np.zeros(1)
@@ -152,7 +156,10 @@ def test_workspace_empty_names_the_limits_that_empty_it(
     names = found.empty_because
     assert names == because if because else any(name.startswith("swing") for name in names)
     # Nodes lie on boundaries too, but never apart from the region.
-    assert workspace_nodes(design).count == 0 or because == ("box x minimum", "box x maximum")
+    assert node_count_of(Workspace(design)).count == 0 or because == (
+        "box x minimum",
+        "box x maximum",
+    )
 
 
 def test_workspace_of_parallel_lines_is_empty_unless_no_margin_is_demanded() -> None:
@@ -173,8 +180,8 @@ def test_balls_that_are_equal_count_once() -> None:
 @pytest.mark.parametrize("step", [0.0, math.nan, 1e-3])
 def test_nodes_with_an_unusable_step_or_rotation_are_refused(step: float) -> None:
     with pytest.raises(InputError, match="node"):
-        workspace_nodes(OPTIMAL, step=step)
-    for measure in (workspace_volume, workspace_nodes):
+        node_count_of(Workspace(OPTIMAL), step=step)
+    for measure in (workspace_volume, workspace_solid):
         with pytest.raises(InputError, match="rotation"):
             measure(OPTIMAL, 2.0 * np.eye(3))
 
@@ -203,7 +210,7 @@ CASES: dict[str, Callable[[int], tuple[Design, FloatArray]]] = {
 
 def volume_in_parts(design: Design, rotation: FloatArray) -> tuple[float, float]:
     """Return the volume as the sum of many parts along x, and the sum of their errors."""
-    region = region_of(constraints(design, rotation))
+    region = region_of(Workspace(design, rotation).limits)
     if region.box is None:
         return 0.0, 0.0
     rates = np.zeros((len(region.circles) + len(region.planes), 4))
@@ -233,7 +240,7 @@ def test_volume_in_parts_sums_to_the_whole_within_its_error(kind: str) -> None:
     off: list[tuple[int, float]] = []
     for seed in range(SEEDS):
         design, rotation = CASES[kind](seed)
-        found = workspace_volume(design, rotation, explain=False)
+        found = workspace_volume(design, rotation)
         volume, error = volume_in_parts(design, rotation)
         room = found.error + min(error, found.error) + ROUNDING * volume
         assert kind != "ordinary" or found.error <= 1e-11 * found.volume

@@ -26,8 +26,8 @@ from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import dim
 from explorer.app.widgets.theme import Theme
 from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
+from explorer.jobs.jobs import Jobs
 from explorer.measures.blocks.source import Source
-from explorer.page.session.worker import Worker
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Command, Commands, Key
 
@@ -47,7 +47,7 @@ class Services:
     Attributes:
         server: Server of the scene and the controls.
         session: Session to which changes are posted.
-        worker: Process for long computations.
+        jobs: Processes for long computations.
         buttons: Buttons in the markup of the page.
         downloads: Sender of files to browsers.
         complain: Function that shows a problem to one client, or to all for None.
@@ -63,7 +63,7 @@ class Services:
 
     server: viser.ViserServer
     session: Session
-    worker: Worker
+    jobs: Jobs
     buttons: Buttons
     downloads: Downloads
     complain: Callable[[str, Who], None]
@@ -215,7 +215,7 @@ class Panel(Protocol):
 
 
 class Feed(Protocol):
-    """Requests drawings from the worker, before the frame is drawn."""
+    """Requests drawings from the process of the page, before the frame is drawn."""
 
     def follow(self, frame: Frame) -> None:
         """Request what a frame needs, unless it is requested already."""
@@ -236,10 +236,6 @@ class Runner(ABC):
     def finish(self) -> None:
         """End work whose result so far is kept, before the session ends."""
         return
-
-    def wait_until_idle(self, timeout: float) -> bool:  # noqa: ARG002 - some begin no work
-        """Wait until the work that leads to a new frame is done; say whether it is."""
-        return True
 
 
 @dataclass(frozen=True)
@@ -343,11 +339,10 @@ class Feature:
         openers: Functions that open files, by a field that no other kind of file has; a file with
             none of these fields is a design.
         scene: Classes of its parts of the scene.
-        feeds: Feeds, which request drawings from the worker; `feed_of` declares one.
+        feeds: Feeds, which request drawings from the process of the page; `FeedOf` declares one.
         later_feeds: Feeds whose requests come after those of all features' `feeds`, since nobody
             waits for their results while the scene changes.
         runners: Classes that do long work.
-        tasks: Functions that the worker calls; it imports them when it starts.
         commands: Commands that have no control.
         passing: Function that returns the commands that come and go, such as those that open a
             saved design; the same object while they stay.
@@ -366,7 +361,6 @@ class Feature:
     feeds: tuple[Callable[[Services], Feed], ...] = ()
     later_feeds: tuple[Callable[[Services], Feed], ...] = ()
     runners: tuple[Callable[[Services], Runner], ...] = ()
-    tasks: tuple[Callable[..., object], ...] = ()
     commands: tuple[StateCommand, ...] = ()
     passing: Callable[[Services], tuple[Command, ...]] | None = None
     floor: Callable[[Services], float | None] | None = None

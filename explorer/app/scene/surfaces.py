@@ -15,7 +15,6 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from explorer.mechanism.design import Design
+from explorer.mechanism.machine import NO_LOAD, Six
 from explorer.mechanism.margins import planes_of_singularity
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
 from explorer.numerics.roots import find_roots
@@ -33,6 +32,7 @@ from explorer.workspace.accessible.workspace import PAIR_NAMES
 from explorer.workspace.faces.faces import Faces, divide
 from explorer.workspace.position_bands import PositionBands, PositionMeasure, position_bands
 from explorer.workspace.solids.solid import Solid
+from explorer.workspace.workspace import Workspace
 
 Measure = Literal["plain"] | PositionMeasure
 
@@ -61,28 +61,27 @@ class Shell:
 
 @dataclass(frozen=True)
 class Colouring:
-    """A colouring of positions by a measure, at one orientation, platform to base, shape (3, 3).
+    """A colouring of the positions of a workspace by a measure.
 
     The length below which margins raise a warning is in design units. The load (F; M), besides the
-    payload, acts at the tool point, along base axes, in N and N × unit; None for none.
+    payload, acts at the tool point, along base axes, in N and N × unit.
     """
 
-    design: Design
-    rotation: FloatArray
+    workspace: Workspace
     measure: Measure
     warn_below: float
-    load: FloatArray | None = None
+    load: Six = NO_LOAD
 
     @property
     def banded(self) -> PositionMeasure:
         """The measure of the bands: the smallest margin for one colour."""
         return "margin" if self.measure == "plain" else self.measure
 
-    @cached_property
+    @property
     def bands(self) -> PositionBands:
         """The bands of that measure."""
         return position_bands(
-            self.design, self.rotation, self.banded, warn_below=self.warn_below, load=self.load
+            self.workspace, self.banded, warn_below=self.warn_below, load=self.load
         )
 
     def shells(self, faces: Faces, *, holds: bool = False) -> tuple[Shell, ...]:
@@ -98,7 +97,7 @@ class Colouring:
         bands, is_linear = self.bands, self.measure == "margin"
         vertices, triangles = faces.vertices, faces.triangles
         if not is_linear:
-            longest = COLOURED_EDGE * self.design.reach
+            longest = COLOURED_EDGE * self.workspace.design.reach
             vertices, triangles = cut_to_size(vertices, triangles, longest)
         vertices, triangles = self._split_at_folds(vertices, triangles)
         least = bands.edges[1] if holds and self.measure == "share" else 0.0
@@ -116,7 +115,7 @@ class Colouring:
         self, vertices: FloatArray, triangles: IntArray
     ) -> tuple[FloatArray, IntArray]:
         """Return vertices and triangles, split where the measure has a fold that is a plane."""
-        planes = planes_of_singularity(self.rotation)
+        planes = planes_of_singularity(self.workspace.rotation)
         folds = list(planes)
         if self.measure == "margin":
             # Where two margins are equal, another one becomes the smallest.

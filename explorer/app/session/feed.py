@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from explorer.app.state.frame import Frame
+from explorer.jobs.executor import LongJob
+from explorer.jobs.jobs import Jobs
+from explorer.jobs.process import CANCELLED, Channel
 from explorer.numerics.search import Watch, ignore_stage
 from explorer.page.session.clock import Pause, now
-from explorer.page.session.worker import CANCELLED, Channel, Worker
 
 # Seconds after which a drawing is cancelled as soon as a newer one waits, and its stage is shown.
 LONG_SECONDS = 1.0
@@ -45,32 +47,50 @@ Request = TypeVar("Request")
 Drawing = TypeVar("Drawing")
 
 
-@dataclass(eq=False)
-class Feed(Generic[Request, Drawing]):
-    """Requests drawings of one kind and holds the newest.
-
-    The session, the worker and the browsers change it, each on a thread of its own.
+@dataclass(frozen=True)
+class FeedOf(Generic[Request, Drawing]):
+    """The declaration of a feed, which makes it with the services of a page.
 
     Attributes:
-        worker: The worker that computes them.
-        task: A function of the worker, from requests to drawings.
-        request_of: Returns the request of a frame; None if nothing is to be drawn.
-        redraw: Called when there is a new drawing, stage or problem.
+        task: Function of the page's process, from requests to drawings.
+        request_of: Function from a frame to its request; None if nothing is to be drawn.
         key: Key of the requests, of which the newest counts; the task if None.
         has_stages: Whether the task sends each `Stage`, and parts of the drawing as soon as they
             are known, and can be cancelled.
+        in_scene: Whether drawings have the scale of the opened design, so that none is shown with a
+            design of another size.
+    """
+
+    task: Callable[[Request], Drawing] | Callable[[Request, Channel], Drawing]
+    request_of: Callable[[Frame], Request | None]
+    key: object = None
+    has_stages: bool = field(default=False, kw_only=True)
+    in_scene: bool = field(default=True, kw_only=True)
+
+    def __call__(self, services: Any) -> Feed[Request, Drawing]:
+        """Return the feed of a page."""
+        return Feed(self, services.jobs, services.session.redraw)
+
+
+class Feed(Generic[Request, Drawing]):
+    """Requests drawings of one kind and holds the newest.
+
+    The session, the process and the browsers change it, each on a thread of its own.
+
+    Args:
+        kind: Its declaration.
+        jobs: The processes, of which that of the page computes the drawings.
+        redraw: Called when there is a new drawing, stage or problem.
+
+    Attributes:
         request: The newest request; None if nothing is to be drawn.
         problem: Why there is no newer drawing, if the last request failed.
     """
 
-    worker: Worker
-    task: Callable[[Request], Drawing] | Callable[[Request, Channel], Drawing]
-    request_of: Callable[[Frame], Request | None]
-    redraw: Callable[[], None]
-    key: object = None
-    has_stages: bool = field(default=False, kw_only=True)
-
-    def __post_init__(self) -> None:
+    def __init__(
+        self, kind: FeedOf[Request, Drawing], jobs: Jobs, redraw: Callable[[], None]
+    ) -> None:
+        self._kind, self._jobs, self._redraw = kind, jobs, redraw
         self.request: Request | None = None
         self.problem: str | None = None
         self._lock = threading.RLock()
@@ -84,9 +104,10 @@ class Feed(Generic[Request, Drawing]):
         self._part: object = None
         self._stage: Stage | None = None
         # Shows the first stage of a drawing that takes long.
-        self._stage_pause = Pause(LONG_SECONDS, self.redraw)
-        # Number of the newest request, its time, and its number in the worker.
-        self._count, self._submitted, self._order = 0, 0.0, -1
+        self._stage_pause = Pause(LONG_SECONDS, self._redraw)
+        # Number of the newest request, its time, and its job.
+        self._count, self._submitted = 0, 0.0
+        self._job: LongJob | None = None
 
     @property
     def drawing(self) -> Drawing | None:
@@ -121,26 +142,26 @@ class Feed(Generic[Request, Drawing]):
 
     def follow(self, frame: Frame) -> None:
         """Request the drawing of a frame, unless it is the newest request already."""
-        request, reach = self.request_of(frame), frame.state.base.reach
+        request, reach = self._kind.request_of(frame), frame.state.base.reach
         with self._lock:
             if request == self.request:
                 return
-            if abs(math.log(reach / self._reach)) > math.log(OTHER_SIZE):
+            if self._kind.in_scene and abs(math.log(reach / self._reach)) > math.log(OTHER_SIZE):
                 self._drawing, self._part, self._oldest = None, None, self._count + 1
             self._reach = reach
-            if request is None and self.has_stages:
-                self.worker.cancel(self._order)
+            if request is None and self._kind.has_stages and self._job is not None:
+                self._job.cancel()
             self.problem, self.request = None, request
             self._submit()
 
     def cancel(self) -> None:
         """Cancel the drawing being computed, if it can be; `retry` requests it again."""
         with self._lock:
-            if not self.has_stages or self.is_settled:
+            if not self._kind.has_stages or self.is_settled or self._job is None:
                 return
-            self.worker.cancel(self._order, CANCEL_SECONDS)
             self.problem = CANCELLED
-        self.redraw()
+            self._job.cancel(CANCEL_SECONDS)
+        self._redraw()
 
     def retry(self) -> None:
         """Request a drawing again that was cancelled."""
@@ -149,7 +170,7 @@ class Feed(Generic[Request, Drawing]):
                 return
             self.problem = None
             self._submit()
-        self.redraw()
+        self._redraw()
 
     def _submit(self) -> None:
         request = self.request
@@ -164,19 +185,19 @@ class Feed(Generic[Request, Drawing]):
                 self._receive_stage(count, value)
             else:
                 self._part = value
-                self.redraw()
+                self._redraw()
 
-        before = self._order
-        self._order = self.worker.submit(
-            self.task if self.key is None else self.key,
-            self.task,
+        kind, before = self._kind, self._job
+        self._job = self._jobs.start(
+            kind.task,
             (request,),
             lambda drawing: self._show_drawing(count, request, drawing),
             lambda problem: self._show_problem(count, problem),
-            receive if self.has_stages else None,
+            receive if kind.has_stages else None,
+            key=kind.task if kind.key is None else kind.key,
         )
-        if self.has_stages:
-            self.worker.cancel(before, after=LONG_SECONDS)
+        if kind.has_stages and before is not None:
+            before.cancel(after=LONG_SECONDS)
 
     def _receive_stage(self, count: int, stage: Stage) -> None:
         with self._lock:
@@ -184,7 +205,7 @@ class Feed(Generic[Request, Drawing]):
                 return
             is_first, self._stage = self._stage is None, stage
         if self.stage is not None:
-            self.redraw()
+            self._redraw()
         elif is_first:
             self._stage_pause.begin()
 
@@ -197,7 +218,7 @@ class Feed(Generic[Request, Drawing]):
             if self.is_current:
                 self.problem = None
                 self._stage_pause.cancel()
-        self.redraw()
+        self._redraw()
 
     def _show_problem(self, count: int, problem: str) -> None:
         with self._lock:
@@ -205,16 +226,10 @@ class Feed(Generic[Request, Drawing]):
                 return
             self._drawing, self._part, self.problem = None, None, problem
             self._stage_pause.cancel()
-        self.redraw()
+        self._redraw()
 
 
-def feed_of(
-    task: Callable[[Request], Drawing] | Callable[[Request, Channel], Drawing],
-    request_of: Callable[[Frame], Request | None],
-    *,
-    has_stages: bool = False,
-) -> Callable[[Any], Feed[Request, Drawing]]:
-    """Return the function that makes a feed with the services of a page; see `Feed`."""
-    return lambda services: Feed(
-        services.worker, task, request_of, services.session.redraw, has_stages=has_stages
-    )
+def modules_of(feeds: Iterable[object]) -> tuple[str, ...]:
+    """Return the modules of the tasks of those feeds that are declared by `FeedOf`."""
+    kinds: list[FeedOf[Any, Any]] = [each for each in feeds if isinstance(each, FeedOf)]
+    return tuple(dict.fromkeys(each.task.__module__ for each in kinds))

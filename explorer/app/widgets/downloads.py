@@ -1,6 +1,7 @@
 """Files sent to browsers, each to the one that asked and to no other.
 
-The worker makes files that need computing; a thread here waits for those that a browser draws.
+The process of the page makes files that need computing; a thread here waits for those that a
+browser draws.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import viser
 
 from explorer.app.session.session import Who
 from explorer.errors import ExplorerError
-from explorer.page.session.worker import Worker
+from explorer.jobs.jobs import Jobs
 
 # Number of browsers that are waited for at the same time.
 MOST_WAITED_FOR = 4
@@ -27,15 +28,15 @@ class Downloads:
 
     Args:
         server: Server of the browsers.
-        worker: Worker that makes files.
+        jobs: The processes, of which that of the page makes files.
         complain: Called with a message for people and the client it is for.
     """
 
     def __init__(
-        self, server: viser.ViserServer, worker: Worker, complain: Callable[[str, Who], None]
+        self, server: viser.ViserServer, jobs: Jobs, complain: Callable[[str, Who], None]
     ) -> None:
         self._server = server
-        self._worker = worker
+        self._jobs = jobs
         self._complain = complain
         self._threads = ThreadPoolExecutor(MOST_WAITED_FOR, thread_name_prefix="downloads")
 
@@ -57,14 +58,14 @@ class Downloads:
         arguments: tuple[Any, ...],
         notice: tuple[str, str] | None = None,
     ) -> None:
-        """Send a file that the worker makes.
+        """Send a file that the process of the page makes.
 
         It replaces one of the same name that waits for the same browser.
 
         Args:
             who: The browser.
             name: Name of the file.
-            task: A function of the worker.
+            task: A function of that process.
             arguments: Arguments of the task.
             notice: Title and text that the browser shows meanwhile.
         """
@@ -86,8 +87,8 @@ class Downloads:
             self._complain(problem, who)
 
         # A file that a notice announces is never replaced.
-        key = object() if notice is not None else ("download", who, name)
-        self._worker.submit(key, task, arguments, done, failed)
+        key = None if notice is not None else ("download", who, name)
+        self._jobs.start(task, arguments, done, failed, key=key)
 
     def make(self, who: Who, doing: str, make: Callable[[viser.ClientHandle], File]) -> None:
         """Send a file that a thread makes with the browser.

@@ -33,7 +33,8 @@ from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.statics import accuracy
 from explorer.workspace.solids.solid import convex_hull
-from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.solids.solids import whole_solid
+from explorer.workspace.workspace import Workspace
 
 What = Literal[
     "workspace", "hull", "mechanism", "simulation", "scene", "page", "figure", "kernel", "linuxcnc"
@@ -167,10 +168,11 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
     mesh.check_format(file_format, mesh.FORMATS, "mesh")
     design = command.read_design()
     home = command.oriented_home(design)
+    workspace = Workspace(design, home.rotation)
     if command.load is None:
-        solid = workspace_solid(design, home.rotation, command.tolerance)
+        solid = whole_solid(workspace, command.tolerance)
     else:
-        part = options.carrying_part(design, home.rotation, command.load, command.tolerance)
+        part = options.carrying_part(workspace, command.load, command.tolerance)
         solid = part.solid
         if part.factor is not None:
             share, _ = format_apart((part.factor, 1.0), 3)
@@ -204,7 +206,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
     check_extra("cad")
     design = command.read_design()
     home = command.oriented_home(design)
-    solid = step.exact_workspace(design, home.rotation)
+    solid = step.exact_workspace(Workspace(design, home.rotation))
     shift = command.shift(design, home)
     if shift is not None:
         solid = solid.shift(shift * design.unit_mm)

@@ -107,12 +107,12 @@ class Workspace(
             answer.lines += ["", f"orientation capability {100.0 * capability:.2f} %"]
         if self.interference:
             answer.add_accessible(
-                accessible.accessible_workspace(
-                    design, pose.rotation, node_step=self.step, tolerance=self.tolerance
+                accessible.accessible_part(
+                    case.workspace, node_step=self.step, tolerance=self.tolerance
                 )
             )
         if self.radius_curve:
-            answer.add_curve(radii.radius_curve(design, pose.rotation))
+            answer.add_curve(radii.radius_curve(case.workspace))
         angles = "  ".join(output.degrees(yaw_pitch_roll_from_rotation(pose.rotation).tolist()))
         head = [output.heading(design), f"yaw pitch roll  {angles}", ""]
         if self.at == "tool":
@@ -129,8 +129,7 @@ class Workspace(
     def _add_meshes(self, answer: _Answer, orientations: FloatArray | None) -> None:
         """Add the volumes of the meshes: the workspace and what is asked for besides."""
         case = answer.case
-        design, rotation = case.design, case.rotation
-        solid = solids.workspace_solid(design, rotation, self.tolerance, volume=case.volume)
+        design, solid = case.design, solids.whole_solid(case.workspace, self.tolerance)
         answer.add_mesh("mesh", "mesh", solid)
         if solid.agrees is False:
             answer.values["mesh_agrees"] = False
@@ -149,7 +148,7 @@ class Workspace(
                 key, remark = f"{name}_mesh", f"{count} orientations, "
                 answer.add_mesh(f"{name} workspace", key, mesh, remark)
         if self.load is not None:
-            part = options.carrying_part(design, rotation, self.load, self.tolerance)
+            part = options.carrying_part(case.workspace, self.load, self.tolerance)
             answer.values["held_volume"] = part.held_volume
             answer.values["held_mesh"] = _mesh_json(part.solid)
             remark = _mesh_remark(part.solid)

@@ -19,16 +19,13 @@ import numpy as np
 from explorer.export.drawings.markup import coordinate, drawing_text, element, line, path_of
 from explorer.export.drawings.mechanism import WIDTH, round_length, svg_drawing
 from explorer.legs.clearance import leg_clearances
-from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, WARN_SHARE, css
-from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.limits.region import region_of
 from explorer.workspace.position_bands import MEASURE_WORDS, PositionBands, position_bands
 from explorer.workspace.slices.outline import AXES, Edge, level_loops, slice_outline
+from explorer.workspace.workspace import Workspace
 
 # The space around a map that has ticks, and between maps.
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 12.0, 26.0, 38.0
@@ -46,22 +43,20 @@ NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY = OUTLINE, 0.38
 
 @dataclass(frozen=True)
 class Slices:
-    """Slices of the workspace of a design at one orientation, platform to base, shape (3, 3).
+    """Slices of a workspace.
 
     The lows and highs (3,) are corners of a box that holds the workspace; the measure that is drawn
     is in bands.
     """
 
-    design: Design
-    rotation: FloatArray
+    workspace: Workspace
     lows: FloatArray
     highs: FloatArray
     bands: PositionBands
 
     @staticmethod
     def of(
-        design: Design,
-        rotation: FloatArray,
+        workspace: Workspace,
         extent: tuple[FloatArray, FloatArray],
         bands: PositionBands | None = None,
     ) -> Slices:
@@ -70,11 +65,11 @@ class Slices:
         Without bands, those of the smallest margin on a new page are drawn.
         """
         if bands is None:
-            warn_below = WARN_SHARE * design.reach
-            bands = position_bands(design, rotation, "margin", warn_below=warn_below)
-        lows, highs = region_of(constraints(design, rotation)).ends
+            warn_below = WARN_SHARE * workspace.design.reach
+            bands = position_bands(workspace, "margin", warn_below=warn_below)
+        lows, highs = workspace.region.ends
         lows, highs = np.maximum(lows, extent[0]), np.minimum(highs, extent[1])
-        return Slices(design, rotation, lows, highs, bands)
+        return Slices(workspace, lows, highs, bands)
 
     @property
     def own_scale(self) -> float:
@@ -126,10 +121,9 @@ class Slices:
             fill_rule="evenodd",
             class_="is-blocked",
         )
-        if any(self.design.limits.leg_radii):
+        if any(self.workspace.design.limits.leg_radii):
             columns, rows, points = self._grid(axis, level, CELLS)
-            configuration = Configuration(self.design, points, self.rotation)
-            least = leg_clearances(configuration).clearance.min(axis=-1)
+            least = leg_clearances(self.workspace.at(points)).clearance.min(axis=-1)
             add(
                 level_loops(columns, rows, -least, 0.0),
                 fill=css(OUTLINE),
@@ -142,11 +136,11 @@ class Slices:
     def _outline_data(self, axis: str, level: float) -> str:
         """Return the outline of a slice as the data of a path; "" if the slice is empty."""
         lows, scale = self.lows[in_plane(axis)], self.own_scale
-        outline = slice_outline(self.design, self.rotation, axis, level)
+        outline = slice_outline(self.workspace, axis, level)
         if outline is not None:
             return "".join(_loop_data(loop, lows, scale) for loop in outline)
         columns, rows, points = self._grid(axis, level, CELLS)
-        slack = slacks(constraints(self.design, self.rotation), points).min(axis=-1)
+        slack = self.workspace.slacks(points).min(axis=-1)
         loops = level_loops(columns, rows, slack, 0.0)
         return "".join(path_of((loop - lows) * scale) for loop in loops)
 
@@ -182,11 +176,11 @@ class Slices:
 
         They have the sign of the determinant.
         """
-        sign = np.where(margins(points, self.rotation).prod(axis=-1) < 0.0, -1.0, 1.0)
+        sign = np.where(margins(points, self.workspace.rotation).prod(axis=-1) < 0.0, -1.0, 1.0)
         return sign * self.bands.values(points)
 
     def _beyond_margin(self, axis: str, level: float, margin: float) -> Iterator[FloatArray]:
-        gradients = planes_of_singularity(self.rotation)
+        gradients = planes_of_singularity(self.workspace.rotation)
         for signs in itertools.product((-1.0, 1.0), repeat=3):
             polygon = self._corners(axis)
             for sign, gradient in zip(signs, gradients, strict=True):
@@ -304,7 +298,7 @@ def legend(slices: Slices, unit_mm: float) -> Element:
     for index, colour in enumerate(colours):
         x = left + step * index
         pieces.append(element("rect", x=x, y=4.0, width=step, height=14.0, fill=css(colour)))
-    if any(slices.design.limits.leg_radii):
+    if any(slices.workspace.design.limits.leg_radii):
         x = left + step * len(colours) + 18.0
         pieces.append(element("rect", x=x, y=4.0, width=14.0, height=14.0, fill=css(OUTLINE)))
         pieces.append(drawing_text("legs collide", x + 19.0, 15.0))

@@ -24,11 +24,11 @@ from explorer.paths.drives import TimedPath
 from explorer.prototype.assembly import Bill, bill_of_materials, make_prototype
 from explorer.statics.compliance import largest_deflection
 from explorer.statics.loaded import LoadedPose, ToolPrecision
-from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_workspace
+from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_part
 from explorer.workspace.carried_region import CarriedRegion
 from explorer.workspace.slices.volume import NodeCount
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.solids.solids import whole_solid
 
 T = TypeVar("T")
 
@@ -63,7 +63,7 @@ class ReportData(Case):
         """The words for the pose."""
         return "its home pose" if self.is_home else "the pose of this report"
 
-    @cached_property
+    @property
     def measurements(self) -> Measurements:
         """Measures of the catalogue that the report lists."""
         return measure_design(self, measures_in("report"))
@@ -73,25 +73,24 @@ class ReportData(Case):
         """Values of the design in the pose."""
         return evaluate(self.design, self.at)
 
-    @cached_property
+    @property
     def node_count(self) -> NodeCount | ExplorerError:
         """Nodes of the workspace, counted as in the paper."""
         return compute(lambda: self.paper_nodes)
 
-    @cached_property
+    @property
     def solid(self) -> Solid | ExplorerError:
         """Mesh of the workspace."""
         if self.volume.volume <= 0.0:
             return NoAnswerError("the workspace is empty")
-        return compute(lambda: workspace_solid(self.design, self.rotation, volume=self.volume))
+        return compute(lambda: whole_solid(self.workspace))
 
-    @cached_property
+    @property
     def accessible(self) -> AccessibleWorkspace | ExplorerError | None:
         """Accessible part of the workspace; None where all legs have zero radius."""
         if not any(self.design.limits.leg_radii):
             return None
-        start = self.at.position
-        return compute(lambda: accessible_workspace(self.design, self.rotation, start=start))
+        return compute(lambda: accessible_part(self.workspace, self.at.position))
 
     @property
     def loaded_pose(self) -> LoadedPose:
@@ -104,7 +103,7 @@ class ReportData(Case):
         has_load = self.design.tool != Tool() or self.design.payload != Payload()
         return has_load or self.has("is_limited")
 
-    @cached_property
+    @property
     def carrying_part(self) -> CarriedRegion | ExplorerError | None:
         """Part of the workspace that holds the payload; None without a payload or limits."""
         if not (self.has("is_loaded") and self.has("is_limited")):

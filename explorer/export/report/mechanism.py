@@ -172,7 +172,7 @@ def legs_section(data: ReportData) -> Iterator[Element]:
     if isinstance(accessible, AccessibleWorkspace):
         pairs = accessible.pairs
     else:
-        least = least_clearances(data.design, data.rotation)
+        least = least_clearances(data.workspace)
         rows = zip(PAIRS, least.clearance.tolist(), least.bound.tolist(), strict=True)
         pairs = [PairCost(*row, blocked_volume=0.0) for row in rows]
     yield element("h2", "Legs")

@@ -78,7 +78,7 @@ def workspace_section(data: ReportData) -> Iterator[Element]:
 
 
 def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
-    slices, position = Slices.of(data.design, data.rotation, solid.ends), data.at.position
+    slices, position = Slices.of(data.workspace, solid.ends), data.at.position
     yield markup.illustration(
         workspace_views(data.snapshot, solid, slices),
         "The workspace about the mechanism: whole, and cut open at "
@@ -252,7 +252,7 @@ def _over_the_workspace(
             (name, volume, volume * cubic, markup.percentage(volume / entire), remark)
             for name, volume, remark in (
                 ("whole workspace", entire, ""),
-                ("holds the payload", carried.held_volume, "of columns, to a thousandth"),
+                ("holds the payload", carried.held_volume, "of a mesh, to half a per cent"),
             )
         ]
         yield markup.table(("volume", "units³", "cm³", "share", ""), rows, "<>>><")
@@ -281,8 +281,8 @@ def _best(position: FloatArray, factor: float) -> Element:
 
 def _share_slices(data: ReportData, solid: Solid) -> Element:
     warn_below = WARN_SHARE * data.design.reach
-    bands = position_bands(data.design, data.rotation, "share", warn_below=warn_below)
-    slices = Slices.of(data.design, data.rotation, solid.ends, bands)
+    bands = position_bands(data.workspace, "share", warn_below=warn_below)
+    slices = Slices.of(data.workspace, solid.ends, bands)
     maps = slices_through(slices, data.at.position, "load")
     return markup.illustration(
         element("div", maps, legend(slices, data.design.unit_mm)),

@@ -132,8 +132,7 @@ class ClearanceDemand(Demand):
     def find_unproven(self, state: State) -> list[Proof]:
         """Return the pairs that are, or may be, too near in the workspace, and look there too."""
         least = least_clearances(
-            state.design,
-            state.rotation,
+            state.workspace,
             BETWEEN * self.clearance,
             below=self.clearance,
             margin=state.problem.demands.clearance_margin,

@@ -33,7 +33,7 @@ from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimali
 from explorer.optimise.search.starts import open_workspace, promising_starts
 from explorer.optimise.search.state import State, scales
 from explorer.proofs.proof import Proof
-from explorer.workspace.slices.volume import find_emptying_limits
+from explorer.workspace.slices.volume import find_emptying_limits, unexplained_volume
 
 # Largest F = |1 − V/V′| of a matched volume.
 MATCHED = 1e-10
@@ -135,7 +135,7 @@ class Search:
             if self._is_closed(u):
                 nearby = open_workspace(problem, u, see=self._see_opening)
                 if nearby is None:
-                    because = find_emptying_limits(State(problem, u).limits)
+                    because = find_emptying_limits(State(problem, u).workspace.limits)
                     words = (
                         f"the workspace is empty because of {', '.join(because)}, and no "
                         "design nearby opens it"
@@ -234,7 +234,10 @@ class Search:
         # An infinite objective is no optimum.
         if not reported_objective(self.problem, at.state) < most:
             return False
-        return model.worst(at)[0] >= 0.0 and at.state.volume > at.state.workspace.error
+        return (
+            model.worst(at)[0] >= 0.0
+            and at.state.volume > unexplained_volume(at.state.workspace).error
+        )
 
     def _is_short(self, state: State) -> bool:
         """Whether the volume is smaller than demanded."""
@@ -310,7 +313,7 @@ class Search:
             status = "not converged" if self.steps_left <= 0 else "infeasible"
             return Attempt(status, worst if spare < 0.0 else holding, "", best)
         if at.state.volume <= 0.0:
-            because = ", ".join(find_emptying_limits(at.state.limits))
+            because = ", ".join(find_emptying_limits(at.state.workspace.limits))
             words = f"the workspace of the best design found is empty because of {because}"
             return Attempt("infeasible", because, words, best)
         return Attempt("stalled", holding, "", best)

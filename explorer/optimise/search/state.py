@@ -18,7 +18,8 @@ from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import REACH, YAW, Box, Problem
 from explorer.workspace.limits import constraints
-from explorer.workspace.slices.volume import Volume, workspace_volume
+from explorer.workspace.slices.volume import unexplained_volume
+from explorer.workspace.workspace import Workspace
 
 UNBOUNDED = (-np.inf, np.inf)
 """Bounds of a scaled variable that has none."""
@@ -61,9 +62,14 @@ class State:
         return self.problem.design_at(self.values.tolist())
 
     @cached_property
+    def workspace(self) -> Workspace:
+        """The workspace at the orientation of home."""
+        return Workspace(self.design)
+
+    @property
     def rotation(self) -> FloatArray:
         """The orientation of the workspace, shape (3, 3)."""
-        return self.design.home_pose.rotation
+        return self.workspace.rotation
 
     @cached_property
     def yaw(self) -> float:
@@ -81,34 +87,24 @@ class State:
         return BoxStatics(self.design, self.box, self.rotation, self.places)
 
     @cached_property
-    def limits(self) -> tuple[constraints.Constraint, ...]:
-        """The limits of the workspace."""
-        return constraints.constraints(self.design, self.rotation)
-
-    @cached_property
     def regions(self) -> dict[str, constraints.BallOrCylinder | constraints.HalfSpace]:
         """The limits of the workspace by name, without those that no position keeps."""
         return {
             limit.name: limit
-            for limit in self.limits
+            for limit in self.workspace.limits
             if isinstance(limit, constraints.BallOrCylinder | constraints.HalfSpace)
         }
-
-    @cached_property
-    def workspace(self) -> Volume:
-        """Volume of the workspace and its gradient."""
-        return workspace_volume(self.design, self.rotation, explain=False)
 
     @property
     def volume(self) -> float:
         """The exact volume of the workspace."""
-        return self.workspace.volume
+        return unexplained_volume(self.workspace).volume
 
     def volume_root(self, unit: float) -> tuple[float, FloatArray]:
         """Return the cube root of the volume over a unit, and its derivatives, shape (n,)."""
         root = (self.volume / unit) ** (1.0 / 3.0)
         slope = root / (3.0 * self.volume) if self.volume > 0.0 else 0.0
-        return root, slope * self.along(self.workspace.gradient)
+        return root, slope * self.along(unexplained_volume(self.workspace).gradient)
 
     @cached_property
     def chain(self) -> Chain:

@@ -16,12 +16,10 @@ window.explorer.plots ??= (() => {
     const event = { ...JSON.parse(plot.dataset.plot), act, start, end, size: [width, height] };
     window.explorer.press("studies.plot", JSON.stringify(event));
   };
-  const readingOf = (plot) => plot.closest(".ex-plot").parentElement.querySelector(".ex-reading");
   const show = (plot, words, path) => {
     // Another drawing may have taken its place.
     if (!plot.isConnected) return;
-    const reading = readingOf(plot);
-    reading.textContent = words || reading.dataset.hint;
+    window.explorer.tell(plot.closest(".ex-plot"), words || null);
     plot.querySelector(".near").setAttribute("d", path);
   };
   // The press that has not ended; the plot under the pointer with the place there; the plot and the

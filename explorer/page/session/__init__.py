@@ -1,1 +1,1 @@
-"""Clocks, queues and the process that computes for the page."""
+"""The clock of the page, and the queue of its changes."""

@@ -72,6 +72,37 @@ class Timer(Pause):
         self.begin()
 
 
+class Ticker:
+    """Calls a function every so many seconds, on a thread of its own, until it returns False.
+
+    These seconds are the machine's: a test neither advances them nor waits for their end.
+    """
+
+    def __init__(self, seconds: float, tick: Callable[[], bool]) -> None:
+        self._seconds, self._tick = seconds, tick
+        self._stopped = threading.Event()
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin to call, unless that goes on."""
+        with self._lock:
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._run, name="ticker", daemon=True)
+                self._thread.start()
+
+    def stop(self) -> None:
+        """End for good."""
+        self._stopped.set()
+
+    def _run(self) -> None:
+        while not self._stopped.wait(self._seconds):
+            with self._lock:
+                if not self._tick():
+                    self._thread = None
+                    return
+
+
 def ahead() -> float:
     """Return by how many seconds the clock is ahead of the machine's; tests replace this."""
     return 0.0

@@ -18,15 +18,12 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import pairs_are_clear
-from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.number_text import Unit
 from explorer.numerics.search import descend
-from explorer.workspace.limits.constraints import Constraint, constraints, satisfies, slacks
-from explorer.workspace.limits.region import box_of, region_of
-from explorer.workspace.limits.valid_poses import poses_are_valid, violations
+from explorer.workspace.limits.valid_poses import violations
 from explorer.workspace.slices.volume import check_node_count, node_range
+from explorer.workspace.workspace import Workspace
 
 ALL_PAIRS = tuple(range(len(PAIRS)))
 # Clearance, over the reach, below which legs touch at a node.
@@ -88,15 +85,14 @@ class Survey:
     """The limits and collisions of a grid of positions at one orientation.
 
     Attributes:
-        design, rotation, grid: What is surveyed; the rotation is platform to base, shape (3, 3).
+        workspace, grid: What is surveyed.
         within: Whether a node keeps all limits, shape (nx, ny, nz).
         clearance: Clearance of each pair of legs at each node, shape (nx, ny, nz, 6).
         first, second: Flat indices of the two nodes of each step along an axis, shape (m,).
         clear: Whether a pair is certified free of collision on a step, shape (m, 6).
     """
 
-    design: Design
-    rotation: FloatArray
+    workspace: Workspace
     grid: Grid
     within: BoolArray
     clearance: FloatArray
@@ -125,7 +121,7 @@ class Survey:
         for wider in range(3):
             cell = self.grid.cell_around(start, wider)
             near = self.grid.positions[cell]
-            clear = pairs_are_clear(self.design, start, self.rotation, near, self.rotation)
+            clear = moves_are_clear(self.workspace, start, near)
             reached[cell] = clear[..., list(pairs)].all(axis=-1) & self.within[cell]
             if reached.any():
                 break
@@ -148,12 +144,18 @@ class Survey:
         return np.asarray((np.isin(labels, with_seed) & allowed).reshape(shape))
 
 
-def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
+def moves_are_clear(workspace: Workspace, start: FloatArray, end: FloatArray) -> BoolArray:
+    """Return which pairs of legs certainly stay apart on moves between positions, (..., 6)."""
+    rotation = workspace.rotation
+    return pairs_are_clear(workspace.design, start, rotation, end, rotation)
+
+
+def survey(workspace: Workspace, grid: Grid) -> Survey:
     """Check limits and collisions at the nodes and on the steps of a grid of positions."""
     positions = grid.positions
-    slack = SLACK * design.reach
-    satisfied = satisfies(design, constraints(design, rotation), positions)
-    clearance = leg_clearances(Configuration(design, positions, rotation)).clearance
+    slack = SLACK * workspace.design.reach
+    satisfied = workspace.satisfies(positions)
+    clearance = leg_clearances(workspace.at(positions)).clearance
     index = np.arange(math.prod(grid.counts)).reshape(grid.counts)
     ends = [
         (np.delete(index, -1, axis).ravel(), np.delete(index, 0, axis).ravel()) for axis in range(3)
@@ -169,9 +171,9 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
     doubtful = np.flatnonzero((~clear & ends_clear).any(axis=-1))
     nodes = positions.reshape(-1, 3)
     start, end = nodes[first[doubtful]], nodes[second[doubtful]]
-    clear[doubtful] |= pairs_are_clear(design, start, rotation, end, rotation)
+    clear[doubtful] |= moves_are_clear(workspace, start, end)
     within = np.asarray(satisfied.all(axis=-1))
-    return Survey(design, rotation, grid, within, clearance, first, second, clear & ends_clear)
+    return Survey(workspace, grid, within, clearance, first, second, clear & ends_clear)
 
 
 class StartError(InputError):
@@ -187,15 +189,15 @@ class StartError(InputError):
         self.nearest, self.in_millimetres = nearest, in_millimetres
 
 
-def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> None:
+def check_start(workspace: Workspace, position: FloatArray) -> None:
     """Raise a `StartError` unless a position (3,) keeps the limits and no legs collide there.
 
     Its message names the limits or the pairs of legs, and the nearest valid position.
     """
-    (broken,) = violations(Configuration(design, position, rotation))
+    (broken,) = violations(workspace.at(position))
     if not broken:
         return
-    nearest = nearest_clear_position(design, rotation, position)
+    nearest = nearest_clear_position(workspace, position)
 
     def words(unit: Unit | None) -> str:
         faults = "; ".join(each.words(unit) for each in broken)
@@ -205,7 +207,7 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
             remedy = f"the nearest valid position at this orientation is {place}"
         return f"no position is accessible from {_text_of(position, unit)}: {faults}; {remedy}"
 
-    raise StartError(words(None), nearest, words(design.millimetres))
+    raise StartError(words(None), nearest, words(workspace.design.millimetres))
 
 
 def _text_of(position: FloatArray, unit: Unit | None) -> str:
@@ -214,59 +216,50 @@ def _text_of(position: FloatArray, unit: Unit | None) -> str:
 
 
 def count_nodes(
-    design: Design,
-    rotation: FloatArray,
-    limits: tuple[Constraint, ...],
-    start: FloatArray,
-    step: float,
-    most: int | None,
+    workspace: Workspace, start: FloatArray, step: float, most: int | None
 ) -> tuple[int, int] | tuple[None, None]:
     """Count the nodes of the paper's grid within the limits, and the accessible ones.
 
     Both counts are None if the grid has more nodes than `most`.
     """
-    first, counts = node_range(region_of(limits), step)
+    first, counts = node_range(workspace.region, step)
     if most is not None and float(np.prod(counts)) > most:
         return None, None
     check_node_count(counts, step, MOST_PAPER_NODES)
     if not counts.all():
         return 0, 0
     x, y, z = counts.astype(int).tolist()
-    surveyed = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
+    surveyed = survey(workspace, Grid(first * step, np.full(3, step), (x, y, z)))
     within = int(surveyed.within.sum())
-    is_valid = poses_are_valid(design, start, rotation)
+    is_valid = workspace.is_valid(start)
     return within, int(surveyed.accessible_from(start).sum()) if is_valid else 0
 
 
-def nearest_clear_position(
-    design: Design, rotation: FloatArray, position: FloatArray
-) -> FloatArray | None:
+def nearest_clear_position(workspace: Workspace, position: FloatArray) -> FloatArray | None:
     """Return the nearest position within the limits at which no legs collide, shape (3,).
 
     It is the best of the local optima near the nearest free nodes of a grid; None if no node
     of the grid is free.
     """
-    limits = constraints(design, rotation)
-    box = box_of(limits)
+    box, reach = workspace.region.box, workspace.design.reach
     if box is None:
         return None
     nodes = make_cell_grid(*box, CELLS).positions.reshape(-1, 3)
-    nodes = nodes[poses_are_valid(design, nodes, rotation)]
+    nodes = nodes[workspace.is_valid(nodes)]
     if not len(nodes):
         return None
-    reach = design.reach
     nodes = nodes[np.linalg.norm(nodes - position, axis=1).argsort()[:STARTS]]
 
     def slacks_at(p: FloatArray) -> FloatArray:
-        clearance = leg_clearances(Configuration(design, p * reach, rotation)).clearance / reach
+        clearance = leg_clearances(workspace.at(p * reach)).clearance / reach
         spare: FloatArray = np.asarray(np.minimum(clearance, 1.0), dtype=np.float64) - CLEAR
-        return np.concatenate([slacks(limits, p * reach) / reach, spare])
+        return np.concatenate([workspace.slacks(p * reach) / reach, spare])
 
     best = nodes[0]
     for node in nodes:
         candidate = descend_towards(position, slacks_at, node, reach)
         nearer = np.linalg.norm(candidate - position) < np.linalg.norm(best - position)
-        if nearer and poses_are_valid(design, candidate, rotation):
+        if nearer and workspace.is_valid(candidate):
             best = candidate
     return best
 

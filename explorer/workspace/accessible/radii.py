@@ -10,19 +10,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import move_clearances
-from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.computed_once import computed_once
 from explorer.numerics.search import Stages, Watch, ignore_stage
 from explorer.workspace.accessible.nodes import Survey, check_start, make_cell_grid, survey
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
-from explorer.workspace.limits.constraints import orientation_of
-from explorer.workspace.slices.volume import workspace_volume
-from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.slices.volume import volume_of
+from explorer.workspace.solids.solids import whole_solid
+from explorer.workspace.workspace import Workspace
 
 DEFAULT_CELLS = 40
 POINTS = 60
@@ -76,47 +76,45 @@ class RadiusCurve:
         return float(np.interp(-share * float(self.volumes[0]), -self.volumes, self.radii))
 
 
+@computed_once
 def radius_curve(
-    design: Design,
-    rotation: ArrayLike | None = None,
+    workspace: Workspace,
     *,
-    start: ArrayLike | None = None,
+    start: Triple | None = None,
     cells: int = DEFAULT_CELLS,
     watch: Watch = ignore_stage,
 ) -> RadiusCurve:
     """Compute the accessible volume against one radius of all legs.
 
     Args:
-        design: The manipulator; its own radii are ignored.
-        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+        workspace: The workspace; the radii of its design are ignored.
         start: Position from which moves start, shape (3,); that of the home pose if None.
         cells: Number of cells of the grid on each axis of the workspace's extent.
         watch: Called before each stage.
 
     Raises:
-        InputError: Not a rotation, the start breaks a limit, or legs cross there.
+        InputError: The start breaks a limit, or legs cross there.
     """
-    r = orientation_of(design, rotation)
-    p = np.array(design.home_pose.position) if start is None else np.array(start, dtype=float)
-    thin = with_radius(design, 0.0)
+    design = workspace.design
+    p = np.array(design.home_pose.position if start is None else start)
+    thin = Workspace(with_radius(design, 0.0), workspace.rotation)
     stages = Stages(watch, STAGES)
     stages.begin("solid of the limits")
-    exact = workspace_volume(thin, r, explain=False)
-    whole = workspace_solid(thin, r, volume=exact)
+    whole = whole_solid(thin)
     if whole.is_empty:
-        return RadiusCurve(np.zeros(1), np.zeros(1), least_clearances(thin, r))
-    check_start(thin, r, p)
+        return RadiusCurve(np.zeros(1), np.zeros(1), least_clearances(thin))
+    check_start(thin, p)
     stages.begin("least clearances")
-    least = least_clearances(thin, r)
+    least = least_clearances(thin)
     stages.begin("grid of positions")
-    surveyed = survey(thin, r, make_cell_grid(*whole.ends, cells))
+    surveyed = survey(thin, make_cell_grid(*whole.ends, cells))
     stages.begin("widest paths")
     widest = 0.5 * _bottleneck_clearances(surveyed, p)[surveyed.within]
     radii = np.linspace(0.0, float(widest.max(initial=0.0)), POINTS)
     # A cell is accessible with radii up to its own, to rounding.
     accessible_counts = len(widest) - np.searchsorted(np.sort(widest), (1.0 - SAME) * radii)
     shares = np.append(accessible_counts / max(1, len(widest)), 0.0)
-    return RadiusCurve(np.append(radii, radii[-1]), shares * exact.volume, least)
+    return RadiusCurve(np.append(radii, radii[-1]), shares * volume_of(thin).volume, least)
 
 
 def with_radius(design: Design, radius: float) -> Design:
@@ -135,9 +133,7 @@ def _bottleneck_clearances(surveyed: Survey, start: FloatArray) -> FloatArray:
     steps = allowed[surveyed.first] & allowed[surveyed.second] & surveyed.clear.all(axis=1)
     first, second = surveyed.first[steps], surveyed.second[steps]
     near_start = np.flatnonzero(surveyed.nodes_near(start))
-    at_start = float(
-        leg_clearances(Configuration(surveyed.design, start, surveyed.rotation)).clearance.min()
-    )
+    at_start = float(leg_clearances(surveyed.workspace.at(start)).clearance.min())
     # The start is one more node.
     first = np.append(first, np.full(len(near_start), node_count))
     second = np.append(second, near_start)
@@ -171,7 +167,7 @@ def _step_clearances(
     width = np.minimum(distance[first], distance[second])
     length = np.linalg.norm(positions[second] - positions[first], axis=1)
     near = np.flatnonzero(width < length)
-    design, r = surveyed.design, surveyed.rotation
+    design, r = surveyed.workspace.design, surveyed.workspace.rotation
     a, b = positions[first[near]], positions[second[near]]
     exact = move_clearances(design, a, r, b, r, tolerance=TOLERANCE * design.reach)
     width[near] = np.maximum(0.0, np.minimum(width[near], exact.clearance.min(axis=-1)))

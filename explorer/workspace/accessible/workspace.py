@@ -26,10 +26,11 @@ from explorer.legs.clearance import (
     point_rates,
     radii_of_pairs,
 )
-from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Triple
 from explorer.numerics import checks
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot, position_array, triple
+from explorer.numerics.computed_once import computed_once
 from explorer.numerics.search import Stages, Watch, ignore_stage
 from explorer.workspace.accessible.nodes import (
     ALL_PAIRS,
@@ -41,10 +42,10 @@ from explorer.workspace.accessible.nodes import (
     survey,
 )
 from explorer.workspace.least_clearance import least_clearances
-from explorer.workspace.limits.constraints import constraints, orientation_of
-from explorer.workspace.slices.volume import node_step_of, workspace_volume
+from explorer.workspace.slices.volume import node_step_of, volume_of
 from explorer.workspace.solids.solid import Solid, Surface, carved_solid
-from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.solids.solids import whole_solid
+from explorer.workspace.workspace import Workspace
 
 # Newton steps onto the surface, and the largest step as a share of a cell.
 STEPS = 6
@@ -132,7 +133,7 @@ def accessible_workspace(
         rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
         start: Position from which moves start, shape (3,); that of the home pose if None.
         nodes: Number of nodes of the grid on each axis of the workspace's extent.
-        node_step: Step of the paper's grid of nodes, as in `workspace_nodes`.
+        node_step: Step of the paper's grid of nodes, as in `node_count_of`.
         most_nodes: Largest number of nodes of that grid to count; the counts of a finer one are
             None. If this is None, too fine a grid is refused.
         tolerance: Tolerance of the solid where limits bound it, see `explorer.workspace_solid`.
@@ -142,24 +143,43 @@ def accessible_workspace(
         InputError: Not a rotation, a start that collides or breaks a limit (unless the workspace
             is empty), or a number out of range.
     """
-    r = orientation_of(design, rotation)
-    p = np.array(design.home_pose.position) if start is None else np.array(start, dtype=float)
+    return accessible_part(
+        Workspace(design, rotation),
+        None if start is None else triple(position_array("start", start)),
+        nodes=nodes,
+        node_step=node_step,
+        most_nodes=most_nodes,
+        tolerance=tolerance,
+        watch=watch,
+    )
+
+
+@computed_once
+def accessible_part(
+    workspace: Workspace,
+    start: Triple | None = None,
+    *,
+    nodes: int = DEFAULT_NODES,
+    node_step: float | None = None,
+    most_nodes: int | None = None,
+    tolerance: float | None = None,
+    watch: Watch = ignore_stage,
+) -> AccessibleWorkspace:
+    """Compute the accessible part of a workspace, as `accessible_workspace` does."""
+    p = np.array(workspace.design.home_pose.position if start is None else start)
     checks.whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
-    limits = constraints(design, r)
     stages = Stages(watch, FIXED_STAGES + len(ALL_PAIRS))
     stages.begin("solid of the limits")
-    exact = workspace_volume(design, r, explain=False)
-    whole = workspace_solid(design, r, tolerance, volume=exact)
-    step = node_step_of(design, node_step)
+    whole, step = whole_solid(workspace, tolerance), node_step_of(workspace.design, node_step)
     stages.begin("least clearances")
-    least = least_clearances(design, r)
+    least = least_clearances(workspace)
     # A workspace without volume, such as a part of a plane, may hold nodes of the grid.
     volume, solid, accessible, blocked = 0.0, whole, 0.0, dict[int, float]()
     if not whole.is_empty:
-        check_start(design, r, p)
-        volume = exact.volume
+        check_start(workspace, p)
+        volume = volume_of(workspace).volume
         stages.begin("grid of positions")
-        carver = _Carver(design, r, p, whole, volume, nodes)
+        carver = _Carver(workspace, p, whole, nodes)
         blocking = [pair for pair in ALL_PAIRS if least.bound[pair] <= 0.0 and carver.blocks(pair)]
         single_pairs = blocking if len(blocking) > 1 else []
         stages.count = FIXED_STAGES + len(single_pairs)
@@ -176,36 +196,34 @@ def accessible_workspace(
         )
         for pair, legs in enumerate(PAIRS)
     ]
-    counts = count_nodes(design, r, limits, p, step, most_nodes)
+    counts = count_nodes(workspace, p, step, most_nodes)
     return AccessibleWorkspace(volume, accessible, solid, step, *counts, tuple(costs))
 
 
 @dataclass(frozen=True)
 class _Carver:
-    """A cutter of the workspace within the limits, of known volume, along collisions of legs."""
+    """A cutter of the solid of a workspace along collisions of legs."""
 
-    design: Design
-    rotation: FloatArray
+    workspace: Workspace
     start: FloatArray
     whole: Solid
-    volume: float
     nodes: int
 
     @cached_property
     def radii(self) -> FloatArray:
         """Sums of the radii of the pairs, shape (6,)."""
-        return radii_of_pairs(self.design)
+        return radii_of_pairs(self.workspace.design)
 
     @property
     def touching(self) -> float:
         """Clearance that counts as touching, see `TOUCHING`, in design units."""
-        return TOUCHING * self.design.reach
+        return TOUCHING * self.workspace.design.reach
 
     @cached_property
     def survey(self) -> Survey:
         """The survey of the grid, needed only if a pair may collide."""
         grid = make_grid(*self.whole.ends, self.nodes, BEYOND)
-        return survey(self.design, self.rotation, grid)
+        return survey(self.workspace, grid)
 
     def blocks(self, pair: int) -> bool:
         """Return whether a pair that may collide blocks any volume.
@@ -218,21 +236,25 @@ class _Carver:
         cut = surveyed.accessible_from(self.start, ()) & ~surveyed.accessible_from(
             self.start, [pair]
         )
-        return bool((cut & (surveyed.clearance[..., pair] > SLACK * self.design.reach)).any())
+        return bool(
+            (cut & (surveyed.clearance[..., pair] > SLACK * self.workspace.design.reach)).any()
+        )
 
     def carve(self, pairs: list[int]) -> tuple[Solid, float]:
         """Cut out collisions of some pairs; return the part with the start, and its volume."""
         surfaces = [self._surface(pairs)] if pairs else []
         solid = carved_solid(self.whole, surfaces, self.start)
         # Both meshes lack the same volume at the limits, so it cancels in their difference.
-        return solid, max(0.0, self.volume - max(0.0, self.whole.volume - solid.volume))
+        return solid, max(
+            0.0, volume_of(self.workspace).volume - max(0.0, self.whole.volume - solid.volume)
+        )
 
     def _surface(self, pairs: list[int]) -> Surface:
         from scipy.ndimage import binary_dilation
 
-        surveyed, design = self.survey, self.design
+        surveyed, reach = self.survey, self.workspace.design.reach
         extended = surveyed.extend(surveyed.accessible_from(self.start, pairs), pairs)
-        clearance = np.minimum(surveyed.clearance[..., pairs].min(axis=-1), design.reach)
+        clearance = np.minimum(surveyed.clearance[..., pairs].min(axis=-1), reach)
         # Beyond a wall without thickness the distance from it counts as negative.
         values = clearance * np.where(extended, 1.0, -np.sign(clearance))
         if not self.radii[pairs].all():
@@ -298,8 +320,7 @@ class _Carver:
 
     def _nearest_pairs(self, pairs: list[int], points: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the least clearance of some pairs at positions (n, 3), and its pair, (n,) each."""
-        poses = Configuration(self.design, points, self.rotation)
-        clearance = leg_clearances(poses).clearance[:, pairs]
+        clearance = leg_clearances(self.workspace.at(points)).clearance[:, pairs]
         return clearance.min(axis=1), np.array(pairs, dtype=np.int64)[clearance.argmin(axis=1)]
 
     def _signed_distances(
@@ -312,7 +333,7 @@ class _Carver:
         gradients in position, (n, 3), which distances are signed, and the signed ones of the lines
         in any case.
         """
-        poses = Configuration(self.design, at, self.rotation)
+        poses = self.workspace.at(at)
         clearances, axes = leg_clearances(poses), leg_axes(poses)
         rows, ends = np.arange(len(at)), np.array(PAIRS)[pair] - 1
         one, two = axes[rows, ends[:, 0]], axes[rows, ends[:, 1]]
@@ -322,7 +343,7 @@ class _Carver:
         scale = np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1)
         normal = normal / np.where(length > 0.0, length, 1.0)[:, None]
         signed, distance = dot(one[:, 0] - two[:, 0], normal), clearances.distance[rows, pair]
-        is_of_lines = np.abs(np.abs(signed) - distance) <= 1e-9 * self.design.reach
+        is_of_lines = np.abs(np.abs(signed) - distance) <= 1e-9 * self.workspace.design.reach
         has_side = (length > 1e-6 * scale) & is_of_lines
         off = clearances.points[rows, pair, 0] - clearances.points[rows, pair, 1]
         outward = off / np.where(distance > 0.0, distance, 1.0)[:, None]

@@ -15,11 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
+from explorer.numerics.computed_once import computed_once
 from explorer.numerics.roots import find_roots
 from explorer.workspace.faces.surfaces import Smooth, Surfaces, pattern
 from explorer.workspace.limits.constraints import Constraint, Never
 from explorer.workspace.limits.region import box_of, contract_box
 from explorer.workspace.solids.facets import Box
+from explorer.workspace.workspace import Workspace
 
 
 class Division(NamedTuple):
@@ -113,7 +115,13 @@ NOTHING = _Cut(np.zeros((0, 3)), _NO_INDICES, _NO_INDICES, _NO_INDICES.reshape(0
 """No triangles."""
 
 
-def workspace_faces(limits: Sequence[Constraint]) -> Faces:
+@computed_once
+def workspace_faces(workspace: Workspace) -> Faces:
+    """Return the faces of a workspace; none if it is empty."""
+    return faces_within(workspace.limits)
+
+
+def faces_within(limits: Sequence[Constraint]) -> Faces:
     """Return the faces of the positions that satisfy all limits; none if there is no position."""
     smooth = [limit for limit in limits if not isinstance(limit, Never)]
     surfaces = Surfaces(smooth)

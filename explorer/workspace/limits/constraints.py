@@ -10,18 +10,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
-from explorer.mechanism.configuration import tool_offset
-from explorer.mechanism.design import TOLERANCE, Design
-from explorer.mechanism.pose import rotation_array
-from explorer.numerics.arrays import BoolArray, FloatArray, position_array
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray, position_array
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.quantities import Bound, Demand, LegAngle
 from explorer.workspace.limits.table import demands_of
@@ -166,44 +163,15 @@ def shift(limit: Constraint, offset: FloatArray) -> Constraint:
             return limit
 
 
-def orientation_of(design: Design, rotation: ArrayLike | None = None) -> FloatArray:
-    """Return an orientation, shape (3, 3), after checking it; that of the home pose if None."""
-    return design.home_pose.rotation if rotation is None else rotation_array(rotation)
-
-
 def constraints(
-    design: Design, rotation: ArrayLike, signs: tuple[int, int, int] | None = None
+    design: Design, rotation: FloatArray, signs: tuple[int, int, int] | None
 ) -> tuple[Constraint, ...]:
-    """Return the limits of a design at an orientation, in the order of the design file.
+    """Return the limits of a design at an orientation (3, 3), in the order of the design file.
 
     A sign triple may be demanded instead of the home's, even if no margin is demanded.
-
-    Raises:
-        InputError: Not a rotation.
     """
-    r = rotation_array(rotation)
-    return tuple(
-        solid for demand in demands_of(design, signs) for solid in _solids(design, r, demand)
-    )
-
-
-def constraints_over(
-    design: Design, rotations: ArrayLike, tool: ArrayLike | None = None
-) -> list[tuple[Constraint, ...]]:
-    """Return the limits of a design at n orientations (n, 3, 3) as solids of positions of a point.
-
-    The point is in the platform frame, shape (3,), in design units; None for b4.
-
-    Raises:
-        InputError: Not rotations, or not a point.
-    """
-    matrices = rotation_array(rotations)
-    if matrices.ndim != 3 or not len(matrices):
-        raise InputError(f"rotations must have the shape (n, 3, 3); got {matrices.shape}")
-    return [
-        tuple(shift(limit, offset) for limit in constraints(design, r))
-        for r, offset in zip(matrices, tool_offset(matrices, tool), strict=True)
-    ]
+    demands = demands_of(design, signs)
+    return tuple(solid for demand in demands for solid in _solids(design, rotation, demand))
 
 
 def surface_of(
@@ -226,19 +194,13 @@ def surface_of(
             return limit.apex * scale, scale, -limit.axis, math.cos(limit.half_angle), 0.0
 
 
-def slacks(limits: tuple[Constraint, ...], position: ArrayLike) -> FloatArray:
+def slacks(limits: Sequence[Constraint], position: ArrayLike) -> FloatArray:
     """Return the slacks of n limits at positions (..., 3), shape (..., n); negative if violated.
 
     Slacks are in design units, those of cones in radians.
     """
     p = position_array("position", position)
     return np.stack([limit.slack(p) for limit in limits], axis=-1)
-
-
-def satisfies(design: Design, limits: tuple[Constraint, ...], position: ArrayLike) -> BoolArray:
-    """Return whether positions (..., 3) satisfy each of n limits to its tolerance, (..., n)."""
-    tolerances = [TOLERANCE if isinstance(limit, Cone) else design.tolerance for limit in limits]
-    return slacks(limits, position) >= -np.array(tolerances)
 
 
 def angle_between(vector: FloatArray, axis: FloatArray) -> FloatArray:

@@ -16,13 +16,11 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.roots import find_roots
-from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace, constraints
-from explorer.workspace.limits.region import region_of
+from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace
+from explorer.workspace.workspace import Workspace
 
 # Shares of the size of the region: directions that differ by less than SAME are the same, ends of
 # edges closer than CORNER are one corner, and edges shorter than SHORT are dropped.
@@ -78,21 +76,17 @@ class _Curve:
         return self.radius > 0.0
 
 
-def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) -> Outline | None:
+def slice_outline(workspace: Workspace, axis: str, level: float) -> Outline | None:
     """Return the outline of a slice of a workspace across "x", "y" or "z"; None if there is none.
 
     There is none if a limit on a swing bounds it, since a plane does not cut a cone in circles, or
     if edges cannot be distinguished in double precision. The level is the coordinate on the axis.
-
-    Raises:
-        InputError: Not a rotation.
     """
     cut = AXES.index(axis)
     axes = cut, *(other for other in range(3) if other != cut)
-    limits = constraints(design, rotation)
-    if any(isinstance(limit, Cone) for limit in limits):
+    if any(isinstance(limit, Cone) for limit in workspace.limits):
         return None
-    region = region_of(limits)
+    region = workspace.region
     if region.box is None:
         return ()
     size = float(np.abs(region.box).max())

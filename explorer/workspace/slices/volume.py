@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,14 +20,11 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import positive
-from explorer.workspace.limits.constraints import (
-    BallOrCylinder,
-    Constraint,
-    constraints,
-    orientation_of,
-)
+from explorer.numerics.computed_once import computed_once
+from explorer.workspace.limits.constraints import BallOrCylinder, Constraint
 from explorer.workspace.limits.region import Region, column_lengths, mark_nodes, region_of
 from explorer.workspace.slices.integration import volume_of_slices
+from explorer.workspace.workspace import Workspace
 
 # Columns per axis for workspaces with cones, whose slices are not bounded by circles.
 COLUMNS = 400
@@ -78,29 +75,34 @@ class NodeCount:
     extent: tuple[tuple[float, float, float], tuple[float, float, float]] | None
 
 
-def workspace_volume(
-    design: Design, rotation: ArrayLike | None = None, *, explain: bool = True
-) -> Volume:
+def workspace_volume(design: Design, rotation: ArrayLike | None = None) -> Volume:
     """Return the volume of the constant-orientation workspace, and its gradient.
 
-    It is exact to rounding unless cones of swings bound it, see `Volume.error`.
-
-    Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3); that of the home pose if None.
-        explain: Whether to find the limits that empty an empty workspace, which takes longer.
+    It is exact to rounding unless cones of swings bound it, see `Volume.error`. The rotation is
+    from platform to base, shape (3, 3); that of the home pose if None.
 
     Raises:
         InputError: Not a rotation.
     """
-    r = orientation_of(design, rotation)
-    limits = constraints(design, r)
-    volume, error, gradient = volume_of(region_of(limits))
-    because = find_emptying_limits(limits) if explain and volume <= 0.0 else ()
-    return Volume(volume, error, gradient, because)
+    return volume_of(Workspace(design, rotation))
 
 
-def volume_of(region: Region, columns: int = COLUMNS) -> tuple[float, float, dict[str, float]]:
+@computed_once
+def volume_of(workspace: Workspace) -> Volume:
+    """Return the volume of a workspace, its gradient, and the limits that empty an empty one."""
+    plain = unexplained_volume(workspace)
+    if plain.volume > 0.0:
+        return plain
+    return replace(plain, empty_because=find_emptying_limits(workspace.limits))
+
+
+@computed_once
+def unexplained_volume(workspace: Workspace) -> Volume:
+    """Return the volume of a workspace, without the limits that empty an empty one."""
+    return Volume(*region_volume(workspace.region), ())
+
+
+def region_volume(region: Region, columns: int = COLUMNS) -> tuple[float, float, dict[str, float]]:
     """Return the volume of a region, its error, and its derivatives by parameter.
 
     With cones it is that of a number of columns per axis, without derivatives.
@@ -119,19 +121,15 @@ def volume_of(region: Region, columns: int = COLUMNS) -> tuple[float, float, dic
     return volumes[1], abs(volumes[1] - volumes[0]), {}
 
 
-def workspace_nodes(
-    design: Design, rotation: ArrayLike | None = None, step: float | None = None
-) -> NodeCount:
-    """Return the node count of the constant-orientation workspace.
-
-    The rotation is that of the home pose if None, and the step that of `node_step_of`.
+@computed_once
+def node_count_of(workspace: Workspace, step: float | None = None) -> NodeCount:
+    """Return the node count of a workspace, with the step of `node_step_of`.
 
     Raises:
-        InputError: Not a rotation, a step that is not positive, or a grid of too many nodes.
+        InputError: A step that is not positive, or a grid of too many nodes.
     """
-    r = orientation_of(design, rotation)
+    design, region = workspace.design, workspace.region
     width = node_step_of(design, step)
-    region = region_of(constraints(design, r))
     first, number = node_range(region, width)
     check_node_count(number, width, MOST_NODES)
     within = np.zeros(number.astype(np.int64), dtype=np.bool_)
@@ -192,7 +190,7 @@ def find_emptying_limits(limits: Sequence[Constraint]) -> tuple[str, ...]:
 
     def is_empty(chosen: Collection[str]) -> bool:
         rest = [*(limit for limit in limits if limit.name in chosen), surroundings]
-        return volume_of(region_of(rest), COARSE_COLUMNS)[0] <= 0.0
+        return region_volume(region_of(rest), COARSE_COLUMNS)[0] <= 0.0
 
     sufficient = tuple(name for name in names if not is_empty({*names} - {name}))
     if sufficient:

@@ -18,21 +18,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
+from explorer.mechanism.pose import rotation_array
+from explorer.numerics.computed_once import computed_once
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
     Constraint,
     HalfSpace,
-    constraints,
-    constraints_over,
-    orientation_of,
+    shift,
 )
 from explorer.workspace.limits.region import box_of, contract_box, region_of
-from explorer.workspace.slices.volume import Volume, find_emptying_limits, volume_of
+from explorer.workspace.slices.volume import (
+    find_emptying_limits,
+    region_volume,
+    unexplained_volume,
+)
 from explorer.workspace.solids import facets
 from explorer.workspace.solids.facets import Box, Frame, frame_around
 from explorer.workspace.solids.solid import Solid, manifold_of, mesh_of, solid_of, union
+from explorer.workspace.workspace import Workspace
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -50,18 +56,10 @@ FLAT = 1e-3
 FINER, MOST_ROUNDS, MOST_REFINED = 4.0, 10, 60_000
 # The largest difference of a mesh from the exact volume, as a share of it.
 LARGEST_SHARE = 0.01
-# Columns per axis for the exact volume within cones, which then takes as long as the mesh, and for
-# that within a small box.
-COLUMNS, WITHIN_BOX = 120, 400
 
 
 def workspace_solid(
-    design: Design,
-    rotation: ArrayLike | None = None,
-    tolerance: float | None = None,
-    *,
-    volume: Volume | None = None,
-    signs: tuple[int, int, int] | None = None,
+    design: Design, rotation: ArrayLike | None = None, tolerance: float | None = None
 ) -> Solid:
     """Return the constant-orientation workspace as a mesh.
 
@@ -73,21 +71,38 @@ def workspace_solid(
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
         tolerance: Largest distance of a face from the true surface, in design units; a 500th of
             the reach or of the workspace's extent, whichever is smaller, if None.
-        volume: The exact volume, if it has been computed before.
-        signs: Sign triple to demand instead of the home's, even if no margin is demanded.
 
     Raises:
         InputError: Not a rotation, or a tolerance that is not positive or too small.
         ExplorerError: A boolean fails.
     """
-    r = orientation_of(design, rotation)
-    limits = constraints(design, r, signs)
-    if volume is None:
-        exact = _exact_volume(limits, COLUMNS)
-    else:
-        exact = volume.volume, 2.0 * volume.error
-    solid = _make_agreeing_solid(limits, _frame_of([limits], design.reach, tolerance), exact)
+    return whole_solid(Workspace(design, rotation), tolerance)
+
+
+@computed_once
+def whole_solid(workspace: Workspace, tolerance: float | None = None) -> Solid:
+    """Return all of a workspace as a mesh, as `workspace_solid` does."""
+    exact, limits = unexplained_volume(workspace), workspace.limits
+    frame = _frame_of([limits], workspace.design.reach, tolerance)
+    solid = _make_agreeing_solid(limits, frame, (exact.volume, 2.0 * exact.error))
     return replace(solid, empty_because=find_emptying_limits(limits)) if solid.is_empty else solid
+
+
+def _limits_over(
+    design: Design, rotations: ArrayLike, tool: ArrayLike | None
+) -> list[tuple[Constraint, ...]]:
+    """Return the limits at n orientations (n, 3, 3) as solids of positions of a tool point (3,).
+
+    Raises:
+        InputError: Not rotations, or not a point.
+    """
+    matrices = rotation_array(rotations)
+    if matrices.ndim != 3 or not len(matrices):
+        raise InputError(f"rotations must have the shape (n, 3, 3); got {matrices.shape}")
+    return [
+        tuple(shift(limit, offset) for limit in Workspace(design, r).limits)
+        for r, offset in zip(matrices, tool_offset(matrices, tool), strict=True)
+    ]
 
 
 def inclusive_solid(
@@ -106,7 +121,7 @@ def inclusive_solid(
         InputError: Not rotations, not a point, or no usable tolerance.
         ExplorerError: A boolean fails.
     """
-    families = constraints_over(design, rotations, tool)
+    families = _limits_over(design, rotations, tool)
     frame = _frame_of(families, design.reach, tolerance)
     names = _names(families)
     bodies, _ = _make_bodies(families, frame, names)
@@ -135,7 +150,7 @@ def total_solid(
 
     Arguments and errors are those of `inclusive_solid`.
     """
-    limits = [limit for family in constraints_over(design, rotations, tool) for limit in family]
+    limits = [limit for family in _limits_over(design, rotations, tool) for limit in family]
 
     def make_without(name: str) -> Solid:
         others = [limit for limit in limits if limit.name != name]
@@ -175,7 +190,8 @@ def _make_agreeing_solid(
         # Within the box columns are closer and rounding is smaller.
         sides = zip([*-np.eye(3), *np.eye(3)], [*-ends[0], *ends[1]], strict=True)
         walls = (HalfSpace("", side, float(end)) for side, end in sides)
-        exact = _exact_volume([*limits, *walls], WITHIN_BOX)
+        volume, error, _ = region_volume(region_of([*limits, *walls]))
+        exact = volume, 2.0 * error
         for _ in range(MOST_ROUNDS):
             faces = sum(primitive.faces for primitive in _primitives_of(limits, finer))
             if _excess(best, *exact) <= 0.0 or faces > MOST_REFINED:
@@ -378,9 +394,3 @@ def _excess(solid: Solid, volume: float, error: float) -> float:
         return math.inf
     allowed = min(solid.tolerance * float(solid.areas.sum()), LARGEST_SHARE * volume)
     return abs(solid.volume - volume) - allowed - error
-
-
-def _exact_volume(limits: Sequence[Constraint], columns: int) -> tuple[float, float]:
-    """Return the exact volume of a workspace, within cones by columns, and a bound of its error."""
-    volume, error, _ = volume_of(region_of(limits), columns)
-    return volume, 2.0 * error

@@ -13,7 +13,7 @@ import viser
 from explorer.app.features.compare.scene import SCENES
 from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.compare.table import Column, bars, columns_of, notes, table
-from explorer.app.features.compare.work import FEEDS, draw_compared
+from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.session.session import Change
@@ -272,5 +272,4 @@ COMPARE = Feature(
     tabs=(Tab("work", "Compare", ComparePanel, viser.Icon.COLUMNS_3),),
     scene=SCENES,
     feeds=FEEDS,
-    tasks=(draw_compared,),
 )

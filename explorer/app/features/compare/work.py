@@ -6,7 +6,6 @@ requested while there is nothing to compare.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, TypeAlias
@@ -14,10 +13,10 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from explorer.app.features.compare.state import SLOTS, Compared
-from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, rows_of
+from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, kept_workspace, rows_of
 from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
-from explorer.app.session.feed import Feed
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
 from explorer.app.state.state import State
@@ -29,17 +28,16 @@ from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import Rgb
-from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.solids.solids import whole_solid
 
 if TYPE_CHECKING:
     # The process of the worker needs no viser.
-    from explorer.app.features.feature import Services
+    pass
 
 LIVE, NAMES = 0, ("live", *SLOTS)
 """The column of the live design, and the short names of all columns."""
 
-# Number of cached measurements and solids: of the compared designs, and of the last changes.
+# Number of cases that are kept: of the compared designs, and of the last changes.
 CACHED = 8
 NO_COLOUR: Rgb = (0, 0, 0)
 
@@ -93,9 +91,12 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
     shell: Shell | None = None
     problem: str | None = None
     try:
-        measurements = _measure(design, tuple(measures_in("compare")))
+        case = _kept_case(design)
+        measurements = measure_design(case, measures_in("compare"))
         if request.drawn:
-            solid = _solid(design, request.rotation, request.tolerance)
+            rows = request.rotation
+            workspace = case.workspace if rows is None else kept_workspace(design, rows)
+            solid = whole_solid(workspace, request.tolerance or LIVE_TOLERANCE * design.reach)
             if not solid.is_empty:
                 shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
@@ -104,29 +105,11 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
     return ComparedDrawing(request, measurements, shell, lines, problem)
 
 
-@lru_cache(maxsize=CACHED)
-def _measure(design: Design, names: tuple[str, ...]) -> Measurements:
-    return measure_design(Case(design), names)
-
-
-@lru_cache(maxsize=CACHED)
-def _solid(design: Design, rotation: Rows | None, tolerance: float | None) -> Solid:
-    r = design.home_pose.rotation if rotation is None else np.array(rotation)
-    return workspace_solid(design, r, tolerance or LIVE_TOLERANCE * design.reach)
+_kept_case = lru_cache(maxsize=CACHED)(Case)
+"""The case of a design, with all that has been computed of it."""
 
 
 CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]
-
-
-def _feed_of(column: int, services: Services) -> CompareFeed:
-    request, redraw = partial(_compared_request, column), services.session.redraw
-    return Feed(services.worker, draw_compared, request, redraw, key=("compared", column))
-
-
-FEEDS: tuple[Callable[[Services], CompareFeed], ...] = tuple(
-    partial(_feed_of, column) for column in range(len(NAMES))
-)
-"""The feeds by column: the live design, then the pinned ones."""
 
 
 def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
@@ -143,6 +126,13 @@ def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
     is_turned = column == LIVE and compared.look.at_pose
     rotation = rows_of(frame.snapshot.rotation) if is_turned else None
     return ComparedRequest(without_name(design), drawn=True, rotation=rotation, tolerance=tolerance)
+
+
+FEEDS = tuple(
+    FeedOf(draw_compared, partial(_compared_request, column), key=("compared", column))
+    for column in range(len(NAMES))
+)
+"""The feeds by column: the live design, then the pinned ones."""
 
 
 def design_in(column: int, state: State) -> Design | None:

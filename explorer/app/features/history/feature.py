@@ -17,7 +17,7 @@ from explorer.app.features.workspace.feeds import VOLUME_FEED, volume_request
 from explorer.app.features.workspace.work import MeasuredVolume, Selection, measure_volume
 from explorer.app.scene.placing import Placed, ScenePart, outline
 from explorer.app.scene.shapes import GHOST, add_lines
-from explorer.app.session.feed import Feed
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.session.history import History, Step
 from explorer.app.session.session import REDO, UNDO, move_to
 from explorer.app.state.actions import Action, Open
@@ -169,13 +169,11 @@ class DesignChange:
         self._session = services.session
         self._now = services.get(VOLUME_FEED)
         # Another page of the same state may not have measured the design before the change.
-        self._then = Feed[Selection, MeasuredVolume](
-            services.worker,
+        self._then = FeedOf(
             measure_volume,
             lambda _: None if self.before is None else volume_request(self.before),
-            services.session.redraw,
             key="volume before",
-        )
+        )(services)
         self._ended: State | None = None
         services.buttons.on(OVER, self._end, values=("",))
 

@@ -18,7 +18,7 @@ from explorer.app.scene.shapes import (
     add_lines,
     add_translucent,
 )
-from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
 from explorer.app.widgets import charts
 from explorer.app.widgets.blocks import render
@@ -58,7 +58,7 @@ def _request_for(frame: Frame) -> Selection | None:
     return Selection(thin, workspace_rows(frame), "accessible", workspace_start(frame))
 
 
-RADIUS_FEED = feed_of(draw_radius_curve, _request_for, has_stages=True)
+RADIUS_FEED = FeedOf(draw_radius_curve, _request_for, has_stages=True)
 """The feed of the accessible volume over the radius of the legs, while it is shown."""
 
 
@@ -333,5 +333,4 @@ LEGS = Feature(
     bar=(InBar("middle", lambda _: clearance_figure),),
     scene=(ClearanceScene, SweptTetrahedra),
     feeds=(RADIUS_FEED,),
-    tasks=(draw_radius_curve,),
 )

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import BarPart, Feature, InBar, Services, Tab, show_html
-from explorer.app.features.loads import budget, load, precision
+from explorer.app.features.loads import load, precision
 from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEllipsoidScene
 from explorer.app.features.loads.scene import ForcesScene, LoadHandle
 from explorer.app.features.machine.actuators import FORCE, FORCES
@@ -212,5 +212,4 @@ LOADS = Feature(
     exports=(precision.TOLERANCES,),
     scene=(ForcesScene, LoadHandle, ErrorEllipsoidScene, DeflectedScene),
     later_feeds=(load.WEIGHTS_FEED, load.nearest_feed, precision.BUDGET_FEED),
-    tasks=(load.weights_of_parts, load.nearest_position, budget.budget_of, budget.budget_table),
 )

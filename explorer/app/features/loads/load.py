@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from explorer.app.scene.placing import round_step
-from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
@@ -113,7 +113,7 @@ def _weights_request(frame: Frame) -> tuple[Design, float] | None:
     return without_name(frame.state.design), view.prototype.density
 
 
-WEIGHTS_FEED = feed_of(weights_of_parts, _weights_request)
+WEIGHTS_FEED = FeedOf(weights_of_parts, _weights_request)
 
 
 class Loads:
@@ -163,4 +163,4 @@ def nearest_feed(services: Services) -> Feed[LoadedPose, NearestDrawing]:
         loaded = loads.of(frame)
         return loaded if has_limits(loaded.design) and loaded.share > 1.0 else None
 
-    return Feed(services.worker, nearest_position, request_of, services.session.redraw)
+    return FeedOf(nearest_position, request_of)(services)

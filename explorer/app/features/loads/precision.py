@@ -11,7 +11,7 @@ from explorer.app.features.loads.load import Loads
 from explorer.app.features.optimise.work import requested_box
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
-from explorer.app.session.feed import feed_of
+from explorer.app.session.feed import FeedOf
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
@@ -52,7 +52,7 @@ def budget_request(state: State) -> tasks.BudgetRequest:
     )
 
 
-BUDGET_FEED = feed_of(
+BUDGET_FEED = FeedOf(
     tasks.budget_of,
     lambda frame: budget_request(frame.state) if frame.state.view.precision.budget else None,
 )

@@ -18,10 +18,18 @@ from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.jobs.executor import LongJob
 from explorer.numerics.number_text import format_number
-from explorer.optimise.outcome import Iterate, Outcome, Settings, compare_designs, record_of
+from explorer.optimise.outcome import (
+    OBJECTIVE_SYMBOLS,
+    Iterate,
+    Outcome,
+    Settings,
+    compare_designs,
+    record_of,
+)
 from explorer.optimise.search.sqp import Trail
-from explorer.page.session.worker import Worker
+from explorer.page.session.clock import Ticker
 
 # Least seconds between two iterates on the page, and most to wait for the drawing of one.
 PACE, LONGEST = 0.07, 0.25
@@ -35,6 +43,9 @@ LONGEST_END = 5.0
 # Seconds between two checks for the end of a search.
 WAIT_SECONDS = 0.02
 
+SEARCH = "search"
+"""Name of the process of the searches."""
+
 DIED = "the optimiser's process died; the design is as it was, and Optimise starts it again"
 
 
@@ -42,20 +53,19 @@ class Optimiser(Runner):
     """Runner that starts and cancels searches as the state requests, and shows their iterates."""
 
     def __init__(self, services: Services) -> None:
-        self.worker = Worker(services.tell, preload=[optimise.__module__], died=DIED)
-        self._session = services.session
+        self._jobs, self._session = services.jobs, services.session
         # The page shows all of the last iterate once these are settled.
         self._drawings = services.get(WORKSPACE_FEED)
-        services.at_end(self.stop)
-        self._stopped = threading.Event()
-        # Iterates and end that are not shown yet; the worker's thread writes them too.
+        self._ticker = Ticker(PACE, self._tick)
+        services.at_end(self._ticker.stop)
+        # Iterates and end that are not shown yet; the process's thread writes them too.
         self._lock = threading.Lock()
         self._waiting: list[Iterate] = []
         self._ending: Outcome | str | None = None
-        # Number and order of the last run, no order once it is cancelled, and the time of its last
+        # Number and job of the last run, no job once it is cancelled, and the time of its last
         # advance.
         self._number = 0
-        self._order: int | None = None
+        self._job: LongJob | None = None
         self._advanced = 0.0
         self._compared = 0
 
@@ -66,53 +76,41 @@ class Optimiser(Runner):
             return
         if run.phase == "running" and run.number != self._number:
             self._begin(run)
-        elif run.phase == "cancelling" and self._order is not None:
-            self.worker.cancel(self._order, PATIENCE)
-            self._order = None
+        elif run.phase == "cancelling" and self._job is not None:
+            self._job.cancel(PATIENCE)
+            self._job = None
         elif run.phase == "ended" and run.number != self._compared:
             self._compared = run.number
             self._compare(run)
 
     def prepare(self) -> None:
         """Start the process of the searches."""
-        self.worker.start()
+        self._jobs.prepare(SEARCH, [optimise.__module__])
 
     def finish(self) -> None:
         """Cancel a search that goes on, which keeps its best iterate."""
         if Optimisation.of(self._session.state).is_on:
             self._session.do(CancelRun())
-            self._wait_for_end(time.monotonic() + LONGEST_END)
+            deadline = time.monotonic() + LONGEST_END
+            while Optimisation.of(self._session.state).is_on and time.monotonic() < deadline:
+                time.sleep(WAIT_SECONDS)
             # The end is saved once it is drawn.
             self._session.wait_until_idle(LONGEST_END)
 
-    def wait_until_idle(self, timeout: float) -> bool:
-        """Wait until a search and its comparison have ended; return whether they have."""
-        deadline = time.monotonic() + timeout
-        self._wait_for_end(deadline)
-        return self.worker.wait_until_idle(deadline - time.monotonic())
-
-    def _wait_for_end(self, deadline: float) -> None:
-        while Optimisation.of(self._session.state).is_on and time.monotonic() < deadline:
-            time.sleep(WAIT_SECONDS)
-
-    def stop(self) -> None:
-        """End the process and the thread that waits for it."""
-        self._stopped.set()
-        self.worker.stop()
-
     def _begin(self, run: SearchRun) -> None:
-        number = run.number
         with self._lock:
-            self._number, self._waiting, self._ending, self._advanced = number, [], None, 0.0
-        self._order = self.worker.submit(
-            "optimise",
+            self._number, self._waiting, self._ending, self._advanced = run.number, [], None, 0.0
+        self._job = self._jobs.start(
             optimise,
             (run.problem, run.starts),
             self._keep_end,
             self._keep_end,
-            receive=self._receive,
+            self._receive,
+            key=optimise,
+            process=SEARCH,
+            died=DIED,
         )
-        threading.Thread(target=self._play, args=(number,), name="iterates", daemon=True).start()
+        self._ticker.start()
 
     def _receive(self, iterate: Iterate) -> None:
         with self._lock:
@@ -124,17 +122,16 @@ class Optimiser(Runner):
         # A cancelled search ends at once.
         self._session.post(self, self._advance)
 
-    def _play(self, number: int) -> None:
-        """Advance the page from iterate to iterate until the run has ended."""
-        while not self._stopped.wait(PACE):
-            with self._lock:
-                if self._number != number:
-                    return
-                is_idle = not self._waiting and self._ending is None
-            if is_idle or self._session.is_waiting(self):
-                continue
-            if self._drawings.is_settled or time.monotonic() - self._advanced > LONGEST:
-                self._session.post(self, self._advance)
+    def _tick(self) -> bool:
+        """Show the next iterates once the last are drawn; return whether the run goes on."""
+        with self._lock:
+            is_idle = not self._waiting and self._ending is None
+        is_late = time.monotonic() - self._advanced > LONGEST
+        if not (is_idle or self._session.is_waiting(self)) and (
+            self._drawings.is_settled or is_late
+        ):
+            self._session.post(self, self._advance)
+        return self._number != 0
 
     def _advance(self, state: State) -> Action | None:
         """Return the action that shows the next iterates, or the end once all are shown."""
@@ -157,12 +154,14 @@ class Optimiser(Runner):
     def _compare(self, run: SearchRun) -> None:
         best = run.best
         if best is not None:
-            self.worker.submit(
-                "compare",
+            self._jobs.start(
                 compare_designs,
                 (run.problem, run.own.design, best.design),
                 lambda both: self._session.do(Compare(run.number, both)),
                 lambda _: None,
+                key=compare_designs,
+                process=SEARCH,
+                died=DIED,
             )
 
 
@@ -183,6 +182,6 @@ def result_of(run: SearchRun, ending: Outcome | str, iterates: tuple[Iterate, ..
     if not iterates:
         return SearchResult("cancelled", "cancelled before the first iterate")
     found = min(iterates, key=Trail(run.problem).rank)
-    value = format_number(found.value, 6)
+    value = f"{OBJECTIVE_SYMBOLS[run.problem.objective]} = {format_number(found.value, 6)}"
     message = f"cancelled: {value} is the best of {len(iterates)} iterates"
     return SearchResult("cancelled", message, found, starts=iterates[-1].run + 1)

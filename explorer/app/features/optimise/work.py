@@ -12,15 +12,15 @@ import numpy as np
 from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
+from explorer.jobs.process import Channel
 from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import Design
 from explorer.numerics import checks
 from explorer.numerics.number_text import Unit
 from explorer.optimise import conflicts, defaults, problem as problems, solver
 from explorer.optimise.outcome import Outcome
-from explorer.page.session.worker import Channel
-from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.workspace import Workspace
 
 PAPER_REQUEST = OptimisationRequest(volume=defaults.PAPER_VOLUME, clearance=defaults.CLEARANCE)
 """The request of the paper's problem."""
@@ -125,13 +125,12 @@ def default_box(design: Design) -> problems.Box:
 def box_within(design: Design) -> problems.Box:
     """Return a box in the workspace about the home position; a small one if home is outside."""
     home = design.home_pose
-    limits = constraints(design, home.rotation)
-    middle = np.array(home.position)
+    workspace, middle = Workspace(design), np.array(home.position)
     grid = np.indices((TRIED,) * 3).reshape(3, -1).T / (TRIED - 1.0) - 0.5
     low, high = 0.0, 2.0 * design.reach
     for _ in range(HALVINGS):
         half = 0.5 * (low + high)
-        is_within = slacks(limits, middle + half * grid).min() >= 0.0
+        is_within = workspace.contains(middle + half * grid).all()
         low, high = (half, high) if is_within else (low, half)
     edge = SHARE_OF_BOX * low or 0.1 * design.reach
     # Round numbers read better, and the box need not be exact.

@@ -301,5 +301,4 @@ ORIENTATION = Feature(
     tabs=(Tab("analyse", "Tilt", OrientationPanel, viser.Icon.COMPASS),),
     scene=(OrientationScene,),
     later_feeds=(work.POSITION_FEED, work.TILTS_FEED, work.RANGE_FEED),
-    tasks=(work.orientations_at, work.tilts_at_nodes, work.range_solid),
 )

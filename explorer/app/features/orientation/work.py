@@ -10,12 +10,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.app.features.workspace.work import LIVE_TOLERANCE
-from explorer.app.session.feed import Feed, feed_of, watch_of
+from explorer.app.session.feed import Feed, FeedOf, watch_of
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import move_to
 from explorer.app.state.state import State
 from explorer.errors import InputError
+from explorer.jobs.process import Channel
 from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
@@ -26,7 +27,6 @@ from explorer.mechanism.tilt_torsion import (
 )
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.page.session.worker import Channel
 from explorer.workspace.accessible.nodes import make_cell_grid
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.orientations.share import (
@@ -42,6 +42,7 @@ from explorer.workspace.orientations.tilts import (
 )
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import inclusive_solid, total_solid
+from explorer.workspace.workspace import Workspace
 
 ANGLES = ("azimuth", "tilt", "torsion")
 FULL_TURN = 360.0
@@ -163,7 +164,7 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     """Return the greatest tilts over the workspace of tilt zero; `channel` sends progress."""
     (design, torsion, tool), watch = request, watch_of(channel)
     rotation = rotation_from_tilt_torsion((0.0, 0.0, torsion))
-    ends = extent_of(design, rotation)
+    ends = extent_of(Workspace(design, rotation))
     if ends is None:
         return TiltsDrawing(np.zeros((0, 3)), np.zeros(0), 0.0)
     lows, highs = np.array(ends) + tool_offset(rotation, tool)
@@ -234,8 +235,8 @@ def _range_of(frame: Frame) -> RangeRequest | None:
 
 
 PositionFeed: TypeAlias = Feed[PositionRequest, PositionDrawing]
-POSITION_FEED = feed_of(
+POSITION_FEED = FeedOf(
     orientations_at, lambda frame: (frame.state.design, frame.state.position, frame.state.tool)
 )
-TILTS_FEED = feed_of(tilts_at_nodes, _tilts_of, has_stages=True)
-RANGE_FEED = feed_of(range_solid, _range_of)
+TILTS_FEED = FeedOf(tilts_at_nodes, _tilts_of, has_stages=True)
+RANGE_FEED = FeedOf(range_solid, _range_of)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 
 import numpy as np
@@ -12,16 +11,17 @@ from explorer.app.features.feature import Feature, InBar, Runner, Services, Stat
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
-from explorer.app.features.paths.work import DRIVES_FEED, draw_drives
+from explorer.app.features.paths.work import DRIVES_FEED
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import activity, press_button
+from explorer.jobs.executor import LongJob
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import rotation_from_quaternion
 from explorer.numerics.number_text import format_decimals, format_number
-from explorer.page.session.worker import Worker
+from explorer.page.session.clock import Ticker
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key
 from explorer.paths.planning import PlannedPath
@@ -84,38 +84,28 @@ class PathRunner(Runner):
     """Plays and plans paths as the frames request."""
 
     def __init__(self, services: Services) -> None:
-        self.worker = Worker(services.tell, preload=[plan.__module__], died=DIED)
-        self._session = services.session
-        services.at_end(self.stop)
-        self._stopped = threading.Event()
-        self._playing = threading.Event()
+        self._jobs, self._session = services.jobs, services.session
+        self._ticker = Ticker(FRAME_SECONDS, self._tick)
+        services.at_end(self._ticker.stop)
+        self._is_playing = False
         self._advanced_at = 0.0
-        self._thread: threading.Thread | None = None
-        # The last request to plan: its number, and its order at the worker, None once it is done.
+        # The last request to plan: its number, and its job, None once it is done.
         self._request = 0
-        self._order: int | None = None
+        self._job: LongJob | None = None
 
     def follow(self, frame: Frame) -> None:
         """Start or stop playing and planning as a frame requests."""
-        journey, paths = journey_of(frame.state), Paths.of(frame.state)
-        if journey is not None and journey.is_playing:
-            self._play()
-        else:
-            self._playing.clear()
+        paths = Paths.of(frame.state)
+        was_playing, self._is_playing = self._is_playing, is_playing(frame.state)
+        if self._is_playing and not was_playing:
+            self._advanced_at = time.monotonic()
+            self._ticker.start()
         if paths.is_planning and paths.request != self._request:
             self._request = paths.request
             self._plan(frame.state)
-        elif not paths.is_planning and self._order is not None:
-            self.worker.cancel(self._order, 0.0)
-            self._order = None
-
-    def stop(self) -> None:
-        """End the planner's process and the thread that plays."""
-        self._stopped.set()
-        self._playing.set()
-        self.worker.stop()
-        if self._thread is not None:
-            self._thread.join(timeout=5.0)
+        elif not paths.is_planning and self._job is not None:
+            self._job.cancel(0.0)
+            self._job = None
 
     def _plan(self, state: State) -> None:
         number, design, paths = self._request, state.design, Paths.of(state)
@@ -129,33 +119,26 @@ class PathRunner(Runner):
             journey = Journey("planned", title, design, path.poses, is_playing=True, tool=tool)
             self._finish(number, journey, None)
 
-        self._order = self.worker.submit(
-            "plan",
+        self._job = self._jobs.start(
             plan,
             (design, paths.planning, paths.seconds, tool, load, weighed, density),
             take_path,
             lambda problem: self._finish(number, None, problem),
+            key="plan",
+            process="plan",
+            died=DIED,
         )
 
     def _finish(self, request: int, journey: Journey | None, problem: str | None) -> None:
         if request == self._request:
-            self._order = None
+            self._job = None
         self._session.do(TakePlan(request, journey, problem))
 
-    def _play(self) -> None:
-        if self._playing.is_set():
-            return
-        self._advanced_at = time.monotonic()
-        self._playing.set()
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="player", daemon=True)
-            self._thread.start()
-
-    def _run(self) -> None:
-        while self._playing.wait() and not self._stopped.wait(FRAME_SECONDS):
-            # A step that still waits will cover the time until the session handles it.
-            if self._playing.is_set() and not self._session.is_waiting(self):
-                self._session.post(self, self._advance)
+    def _tick(self) -> bool:
+        # A step that still waits will cover the time until the session handles it.
+        if self._is_playing and not self._session.is_waiting(self):
+            self._session.post(self, self._advance)
+        return self._is_playing
 
     def _advance(self, _: State) -> Advance:
         now = time.monotonic()
@@ -180,5 +163,4 @@ PATHS = Feature(
             (Key("P"),),
         ),
     ),
-    tasks=(draw_drives,),
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from explorer.app.features.paths.state import Paths, journey_of
-from explorer.app.session.feed import feed_of
+from explorer.app.session.feed import FeedOf
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.export.drawings.drives import force_speed_chart, time_charts
@@ -47,4 +47,4 @@ def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:
     return DrivesDrawing(tuple(drive_blocks(found)), charts)
 
 
-DRIVES_FEED = feed_of(draw_drives, lambda frame: request_for(frame.state))
+DRIVES_FEED = FeedOf(draw_drives, lambda frame: request_for(frame.state))

@@ -11,7 +11,7 @@ from html import escape
 from typing import TypeAlias
 
 from explorer.app.features.feature import Services, html_of
-from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import with_machine
@@ -38,7 +38,7 @@ def _request_for(frame: Frame) -> Design | None:
 
 
 BuildFeed: TypeAlias = Feed[Design, Buildability]
-BUILD_FEED = feed_of(buildability, _request_for)
+BUILD_FEED = FeedOf(buildability, _request_for)
 
 
 class BuildVerdict:

@@ -30,7 +30,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.page.widgets.assigning import Updates
 from explorer.prototype.assembly import exploded_offsets
-from explorer.prototype.fitting import broken_joint_limits, buildability
+from explorer.prototype.fitting import broken_joint_limits
 from explorer.singularity.colours import (
     BALL,
     CARRIAGE,
@@ -283,6 +283,5 @@ PROTOTYPE = Feature(
     scene=(PrototypeScene,),
     feeds=(PARTS_FEED,),
     later_feeds=(BUILD_FEED,),
-    tasks=(buildability,),
     floor=_floor,
 )

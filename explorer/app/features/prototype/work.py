@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from explorer.app.scene.surfaces import Drawn, with_creases
-from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
 from explorer.errors import ExplorerError
@@ -119,7 +119,7 @@ def _request_for(frame: Frame) -> Design | None:
 
 
 PartsFeed: TypeAlias = Feed[Design, Parts | ExplorerError]
-PARTS_FEED = feed_of(parts_drawing, _request_for)
+PARTS_FEED = FeedOf(parts_drawing, _request_for)
 
 
 def parts_to_draw(feed: PartsFeed) -> Parts | None:

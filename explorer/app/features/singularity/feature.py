@@ -370,7 +370,6 @@ SINGULARITY = Feature(
     bar=(InBar("middle", lambda _: distance_figure),),
     scene=(scene.NearestGhost, scene.EllipsoidScene, scene.BallScene, scene.FreeMotion),
     later_feeds=(work.STRATA_FEED,),
-    tasks=(work.strata_distances,),
     commands=(
         StateCommand(
             "Singularity › Go to the nearest one",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import move_to
@@ -105,5 +105,5 @@ def _request_for(frame: Frame) -> tuple[Design, Pose] | None:
 
 
 StrataFeed: TypeAlias = Feed[tuple[Design, Pose], dict[Stratum, float]]
-STRATA_FEED = feed_of(strata_distances, _request_for)
+STRATA_FEED = FeedOf(strata_distances, _request_for)
 """The distances to the strata, for the diagram; at a singular pose the list needs some too."""

@@ -26,7 +26,7 @@ from explorer.app.features.studies.state import (
     label_of,
 )
 from explorer.app.features.studies.words import BUTTONS, acts, chips, head, legend, table
-from explorer.app.features.studies.work import study_runner
+from explorer.app.features.studies.work import study_feed, study_runner
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.bound import Control
 from explorer.app.inputs.controls import Controls
@@ -132,7 +132,7 @@ class StudiesPanel:
         self.points = gui.add_html("")
         self.table = gui.add_html("")
         self.runner = services.get(study_runner)
-        self.feed = self.runner.feed
+        self.feed = services.get(study_feed)
         services.buttons.on("studies.plot", self._receive)
         run_script(services.server, read_script("plots"))
         self._add_buttons(services.buttons)
@@ -141,7 +141,6 @@ class StudiesPanel:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
-        self.feed.follow(frame)
         studies, drawing, run = Studies.of(frame.state), self.feed.drawing, self.runner.run
         names = (NO_OPTION, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
         yield self.choice, "options", names
@@ -322,7 +321,7 @@ def open_study(services: Services, data: bytes, name: str) -> tuple[Action, str]
     study, folders = decode_study(data, name), services.get(study_folders)
     folder = folders.new(study.name)
     keep_study(folder, study)
-    services.get(study_runner).feed.look()
+    services.get(study_feed).look()
     return OpenStudy(folder.name), f"The study {study.name}; {BUTTONS['continue'][0]} computes it."
 
 
@@ -345,6 +344,7 @@ STUDIES = Feature(
     manual="studies.md",
     tabs=(Tab("work", "Studies", StudiesPanel, viser.Icon.CHART_DOTS),),
     bar=(InBar("right", StudyChip),),
+    later_feeds=(study_feed,),
     exports=(
         Export(
             "Study",

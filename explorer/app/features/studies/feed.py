@@ -1,15 +1,16 @@
 """The plots of the open study, in step with its brushes, its pick and its new results.
 
-A thread of its own reads and draws them, so that the controls of the page stay quick.
+The process of the page reads and draws them, so that the controls stay quick.
 """
 
 from __future__ import annotations
 
 import itertools
-import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
@@ -17,12 +18,13 @@ import numpy as np
 from explorer.app.features.studies.figures import PlotRows, lines_html, points_html, select_rows
 from explorer.app.features.studies.folders import StudyFolders, study_in
 from explorer.app.features.studies.state import Studies, StudyPlan
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import View
 from explorer.errors import ExplorerError, InputError
+from explorer.jobs.jobs import Jobs
 from explorer.numerics.arrays import BoolArray, IntArray
 from explorer.numerics.number_text import Unit, format_number
-from explorer.page.session.latest import LatestWins
 from explorer.sweep.parts import pyarrow
 from explorer.sweep.results import Results, costs, load_results
 
@@ -30,8 +32,9 @@ MOST_ON_PAGE = 100_000
 """Number of designs of the largest study that the page shows."""
 
 
-Request: TypeAlias = tuple[Studies, View, int]
-"""What is drawn: the studies without the plan, the unit of lengths, the version of the results."""
+Request: TypeAlias = tuple[StudyFolders, Studies, View, int]
+"""What is drawn: the folders, the studies without the plan, the unit of lengths, the version of the
+results."""
 
 
 @dataclass(frozen=True)
@@ -69,80 +72,56 @@ class StudyDrawing:
         return self.front[self.inside[self.front]]
 
 
-class StudyFeed:
-    """Thread that reads and draws the open study.
+class StudyFeed(Feed[Request, StudyDrawing]):
+    """The feed of the open study, and the names of all studies.
 
     Args:
         folders: Folders of the studies.
-        redraw: Called after each drawing.
+        jobs: The processes, of which that of the page reads and draws.
+        redraw: Called when there is a new drawing or another list.
     """
 
-    def __init__(self, folders: StudyFolders, redraw: Callable[[], None]) -> None:
-        self.folders = folders
-        # Read here: the thread would redraw a page that is not complete yet.
+    def __init__(self, folders: StudyFolders, jobs: Jobs, redraw: Callable[[], None]) -> None:
+        super().__init__(FeedOf(draw_study, self._request_of, in_scene=False), jobs, redraw)
+        self.folders, self._redraw = folders, redraw
         self.names = tuple(folders.by_name())
-        self.problem: str | None = None
-        self._redraw = redraw
         self._version = itertools.count(1)
         self._computed = 0
-        self._request: Request | None = None
-        self._drawing: StudyDrawing | None = None
-        # Results that were read last; only the thread uses them.
-        self._read: tuple[tuple[str, int], Results, BoolArray] | None = None
-        self._jobs: LatestWins[Request | None] = LatestWins(self._do, "studies")
 
     @property
     def drawing(self) -> StudyDrawing | None:
         """The newest drawing of the open study."""
-        drawing, request = self._drawing, self._request
+        drawing, request = super().drawing, self.request
         if drawing is None or request is None:
             return None
-        return drawing if drawing.studies.name == request[0].name else None
-
-    def follow(self, frame: Frame) -> None:
-        """Draw the study of a frame, unless it is drawn already."""
-        studies = Studies.of(frame.state)
-        if studies.name is None:
-            self._request = self._drawing = self.problem = None
-            return
-        view = View(lengths=frame.state.view.lengths)
-        request = replace(studies, plan=StudyPlan()), view, self._computed
-        if request != self._request:
-            self._request = request
-            self._jobs.post("draw", time.monotonic(), request)
+        return drawing if drawing.studies.name == request[1].name else None
 
     def look(self) -> None:
-        """List the studies again; this returns at once."""
-        self._jobs.post("look", time.monotonic(), None)
+        """List the studies again."""
+        self.names = tuple(self.folders.by_name())
+        self._redraw()
 
     def refresh(self) -> None:
         """Draw again, since there are new results."""
         self._computed = next(self._version)
         self._redraw()
 
-    def wait_until_idle(self, timeout: float = 10.0) -> bool:
-        """Wait until all requests are done; return whether they are."""
-        return self._jobs.wait_until_idle(timeout)
+    def _request_of(self, frame: Frame) -> Request | None:
+        studies, view = Studies.of(frame.state), View(lengths=frame.state.view.lengths)
+        if studies.name is None:
+            return None
+        return self.folders, replace(studies, plan=StudyPlan()), view, self._computed
 
-    def stop(self) -> None:
-        """End the thread."""
-        self._jobs.stop()
 
-    def _do(self, requests: Sequence[Request | None]) -> None:
-        for request in requests:
-            if request is None:
-                self.names = tuple(self.folders.by_name())
-                continue
-            try:
-                self._drawing, self.problem = self._draw(*request), None
-            except Exception as error:  # noqa: BLE001 - a bad file must not end the thread
-                is_known = isinstance(error, ExplorerError)
-                why = "" if is_known else f"the study cannot be drawn: {type(error).__name__}: "
-                self._drawing, self.problem = None, f"{why}{error}"
-        self._redraw()
+def draw_study(request: Request) -> StudyDrawing:
+    """Return a study, read and drawn.
 
-    def _draw(self, studies: Studies, view: View, version: int) -> StudyDrawing:
-        results, front = self._results(str(studies.name), version)
+    Raises:
+        InputError: There is no such study, or it is too large or damaged.
+    """
+    folders, studies, view, version = request
+    try:
+        results, front = _results(folders.folder(str(studies.name)), version)
         lengths, plots = view.unit_for(results.study.base), ("", "")
         seen = select_rows(results, lengths, front, studies)
         inside = np.ones(results.count, dtype=np.bool_) if seen is None else seen.inside
@@ -150,23 +129,28 @@ class StudyFeed:
             plots = lines_html(seen), points_html(seen)
         ordered = sort_front(results, front)
         why = reasons(results)
-        return StudyDrawing(studies, results, lengths, ordered, inside, seen, plots, why)
+    except ExplorerError:
+        raise
+    except Exception as error:
+        # A bad file is no error of the explorer.
+        kind = type(error).__name__
+        raise InputError(f"the study cannot be drawn: {kind}: {error}") from error
+    return StudyDrawing(studies, results, lengths, ordered, inside, seen, plots, why)
 
-    def _results(self, name: str, version: int) -> tuple[Results, BoolArray]:
-        key = (name, version)
-        if self._read is None or self._read[0] != key:
-            pyarrow()
-            folder = self.folders.folder(name)
-            study = study_in(folder)
-            if study.count > MOST_ON_PAGE:
-                raise InputError(
-                    f"{study.name} has {format_number(study.count)} designs and the page shows "
-                    f"studies of up to {format_number(MOST_ON_PAGE)}; explorer sweep --summary "
-                    "prints its front"
-                )
-            results = load_results(folder, study)
-            self._read = (key, results, results.front())
-        return self._read[1:]
+
+@lru_cache(maxsize=1)
+def _results(folder: Path, _: int) -> tuple[Results, BoolArray]:
+    """Return the rows in a folder and which are on the front, for a version of the results."""
+    pyarrow()
+    study = study_in(folder)
+    if study.count > MOST_ON_PAGE:
+        raise InputError(
+            f"{study.name} has {format_number(study.count)} designs and the page shows "
+            f"studies of up to {format_number(MOST_ON_PAGE)}; explorer sweep --summary "
+            "prints its front"
+        )
+    results = load_results(folder, study)
+    return results, results.front()
 
 
 def reasons(results: Results) -> tuple[tuple[str, str, int], ...]:

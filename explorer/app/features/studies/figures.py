@@ -385,9 +385,10 @@ def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[El
 
 
 def _path(look: str, places: FloatArray, colour: str = "") -> Element | None:
+    if not places.size:
+        return None
     style = f"stroke:{colour}" if colour else None
-    data = path_of(places)
-    return element("path", class_=look or None, style=style, d=data) if data else None
+    return element("path", class_=look or None, style=style, d=path_of(places))
 
 
 def _ranges(plotted: PlotRows, name: str) -> list[state.Range]:

@@ -10,13 +10,17 @@ import contextlib
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from explorer.app.features.feature import Services
 from explorer.errors import InputError
 from explorer.files.writing import read_at_most, write_whole
 from explorer.page.storage.folder import make_data_folder, plain_words
 from explorer.sweep.parts import BadPartError, part_paths, read_part
 from explorer.sweep.study import Study, decode_study, encode_study
+
+if TYPE_CHECKING:
+    # The processes need no viser.
+    from explorer.app.features.feature import Services
 
 STUDIES_FOLDER = "studies"
 """Name of the folder of studies in the user's data folder."""

@@ -16,8 +16,10 @@ from explorer.app.features.studies.state import Studies, StudyPlan, study_around
 from explorer.app.session.session import Session, Who
 from explorer.errors import ExplorerError
 from explorer.files.extras import check_extra
+from explorer.jobs.executor import LongJob
+from explorer.jobs.jobs import Jobs
+from explorer.jobs.process import Channel
 from explorer.mechanism.design import Design
-from explorer.page.session.worker import Channel, Worker
 from explorer.sweep.run import Progress, run_study
 from explorer.sweep.study import Study
 from explorer.sweep.workers import LocalWorkers, cores
@@ -82,11 +84,13 @@ def run_in_worker(study: Study, folder: Path, channel: Channel) -> Progress:
 
 def study_runner(services: Services) -> StudyRunner:
     """Return the runner of the studies of a page, with their drawings; for `Services.get`."""
-    feed = StudyFeed(services.get(study_folders), services.session.redraw)
-    runner = StudyRunner(services.session, feed, services.complain)
-    services.at_end(feed.stop)
-    services.at_end(runner.worker.stop)
-    return runner
+    feed = StudyFeed(services.get(study_folders), services.jobs, services.session.redraw)
+    return StudyRunner(services.session, feed, services.jobs, services.complain)
+
+
+def study_feed(services: Services) -> StudyFeed:
+    """Return the drawings of the open study of a page; for `Services.get`."""
+    return services.get(study_runner).feed
 
 
 class StudyRunner:
@@ -95,6 +99,7 @@ class StudyRunner:
     Args:
         session: Session in which studies are opened.
         feed: Drawings of the studies, renewed with new results.
+        jobs: The processes, of which one of its own computes studies.
         complain: Called with a message and the client that it is for.
 
     Attributes:
@@ -102,15 +107,18 @@ class StudyRunner:
     """
 
     def __init__(
-        self, session: Session, feed: StudyFeed, complain: Callable[[str, Who], None]
+        self,
+        session: Session,
+        feed: StudyFeed,
+        jobs: Jobs,
+        complain: Callable[[str, Who], None],
     ) -> None:
-        self.worker = Worker(lambda message: complain(message, None), preload=[__name__], died=DIED)
-        self._session = session
+        self._session, self._jobs = session, jobs
         self.feed = feed
         self._complain = complain
         self._lock = threading.Lock()
         self.run: StudyRun | None = None
-        self._order = 0
+        self._job: LongJob | None = None
         self._drawn = 0.0
 
     def start(self, design: Design, plan: StudyPlan, who: Who = None) -> None:
@@ -146,13 +154,10 @@ class StudyRunner:
             if self.run is None or self.run.is_cancelled:
                 return
             self.run = replace(self.run, is_cancelled=True)
-            order = self._order
-        self.worker.cancel(order, PATIENCE)
+            job = self._job
+        if job is not None:
+            job.cancel(PATIENCE)
         self._session.redraw()
-
-    def wait_until_idle(self, timeout: float = 60.0) -> bool:
-        """Wait until no study is being computed; return whether none is."""
-        return self.worker.wait_until_idle(timeout) and self.run is None
 
     def _begin(self, make_study: Callable[[], tuple[str, Study, Path]], who: Who) -> None:
         with self._lock:
@@ -167,13 +172,14 @@ class StudyRunner:
                 self._complain(str(error), who)
                 return
             self.run = StudyRun(name, study)
-            self._order = self.worker.submit(
-                "study",
+            self._job = self._jobs.start(
                 run_in_worker,
                 (study, folder),
                 lambda _: self._finish(),
                 self._report_failure,
-                receive=self._receive,
+                self._receive,
+                process="study",
+                died=DIED,
             )
         self.feed.look()
         self._session.do(OpenStudy(name), who=who)

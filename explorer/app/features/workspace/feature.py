@@ -169,7 +169,7 @@ class WorkspacePanel:
         yield self._cut, "content", box(self._cuts.html(state))
         picture = ""
         if mapped is not None:
-            mapped = mapped.shift(state.offset(mapped.colouring.rotation))
+            mapped = mapped.shift(state.offset(mapped.colouring.workspace.rotation))
             picture = box(map_picture(mapped, state.position, state.design.reach, state.unit))
         self._mapped = mapped
         yield from show_html(self._map, picture)
@@ -333,5 +333,4 @@ WORKSPACE = Feature(
     ),
     scene=(WorkspaceScene,),
     feeds=(feeds.VOLUME_FEED, feeds.WORKSPACE_FEED),
-    tasks=(work.measure_volume, work.draw_workspace),
 )

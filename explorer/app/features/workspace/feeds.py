@@ -13,11 +13,12 @@ import numpy as np
 
 from explorer.app.features.workspace import work
 from explorer.app.scene.surfaces import Measure
-from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import NO_LOAD
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import triple
 from explorer.workspace.position_bands import LOAD_MEASURES, is_unstated
@@ -93,7 +94,7 @@ def volume_request(frame: Frame) -> work.Selection:
     return work.Selection(frame.state.design, workspace_rows(frame))
 
 
-VOLUME_FEED = feed_of(work.measure_volume, volume_request)
+VOLUME_FEED = FeedOf(work.measure_volume, volume_request)
 """The feed of the volume within the limits, whether or not the solid is drawn.
 
 It takes a tenth of the time of a drawing, and is followed before `WORKSPACE_FEED`, so that it
@@ -136,11 +137,11 @@ def workspace_request(frame: Frame) -> work.WorkspaceRequest | None:
         hull=view.hull,
         # The length changes no drawing that is not coloured by it.
         warn_below=frame.state.warn_below if coloured else 1.0,
-        load=frame.state.load if is_loaded else None,
+        load=frame.state.load if is_loaded else NO_LOAD,
     )
 
 
-WORKSPACE_FEED = feed_of(work.draw_workspace, workspace_request, has_stages=True)
+WORKSPACE_FEED = FeedOf(work.draw_workspace, workspace_request, has_stages=True)
 """The feed of the drawn workspace, whose surface arrives before the numbers."""
 
 
@@ -165,7 +166,7 @@ def send_workspace(
     if at_home:
         region, rows = "limits", work.rows_of(state.design.home_pose.rotation)
     start = workspace_start(frame) if region == "accessible" else None
-    design, load = state.design, None
+    design, load = state.design, NO_LOAD
     if region == "held":
         design, load = loaded_design(state), state.load
     offset = triple(state.offset(rows)) if state.view.at == "tool" else None

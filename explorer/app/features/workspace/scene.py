@@ -22,6 +22,7 @@ from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.faces.surfaces import Surfaces
 from explorer.workspace.limits import constraints as limits
 from explorer.workspace.position_bands import SHARE_COLOURS, STEP_COLOURS
+from explorer.workspace.workspace import Workspace
 
 # Each ray passes at least two faces: the mechanism stays readable within the solid.
 PLAIN_OPACITY = 0.125
@@ -138,7 +139,7 @@ def _most_broken(frame: Frame) -> tuple[str, float, FloatArray] | None:
     p = np.array(feeds.workspace_position(frame))
     broken = [
         (float(limit.slack(p)), limit)
-        for limit in limits.constraints(state.design, rotation)
+        for limit in Workspace(state.design, rotation).limits
         if isinstance(limit, limits.BallOrCylinder | limits.HalfSpace)
     ]
     slack, limit = min(broken, key=lambda pair: pair[0])

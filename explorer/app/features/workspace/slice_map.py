@@ -80,15 +80,13 @@ class SliceMap:
 
     def words_at(self, point: Triple, unit: Unit) -> str:
         """Return the coordinates of a position on the map and the measure there, in a unit."""
-        design, measure, f = self.colouring.design, self.colouring.banded, unit.factor
-        decimals = decimals_for(f * design.reach, DIGITS)
+        workspace, measure, f = self.colouring.workspace, self.colouring.banded, unit.factor
+        decimals = decimals_for(f * workspace.design.reach, DIGITS)
         at = ", ".join(
             f"{AXES[k]} {format_decimals(f * point[k], decimals)}" for k in in_plane(self.axis)
         )
         positions = (np.array(point) - self.offset)[None]
-        values, found = measure_positions(
-            design, self.colouring.rotation, measure, positions, self.colouring.load
-        )
+        values, found = measure_positions(workspace, measure, positions, self.colouring.load)
         value, index = float(values[0]), int(found[0])
         match measure:
             case "margin":
@@ -98,7 +96,11 @@ class SliceMap:
             case _:
                 name, symbol, factor = MEASURE_WORDS[measure]
                 words = f"{name} {format_number(factor * value, 3, infinite='∞')} {symbol}"
-                parts = {"share": part_names(design), "force": PART_NAMES, "bending": PART_NAMES}
+                parts = {
+                    "share": part_names(workspace.design),
+                    "force": PART_NAMES,
+                    "bending": PART_NAMES,
+                }
                 if measure in parts and 0.0 < value < math.inf:
                     words += f" ({parts[measure][index]})"
         return f"{at} {unit.name}: {words}"
@@ -137,7 +139,7 @@ def slice_map(
         part: Cut solid of the part that is drawn; None likewise.
         left_out: Words for positions within the limits beyond that part.
     """
-    slices = Slices.of(colouring.design, colouring.rotation, extent, colouring.bands)
+    slices = Slices.of(colouring.workspace, extent, colouring.bands)
     first, second = in_plane(axis)
     loops: list[FloatArray] = []
     if whole is not None and part is not None:
@@ -145,8 +147,7 @@ def slice_map(
         loops = [loop for solid in (whole, part) for loop in cut_loops(solid, (first, second))]
     drawn = slices.map(axis, level, "workspace-slice", loops)
     (u0, v0), (u1, v1) = (ends[[first, second]].tolist() for ends in (slices.lows, slices.highs))
-    # A copy of the colouring has no bands, whose functions cannot leave the worker.
-    colouring, scale, markup = replace(colouring), slices.own_scale, as_html(drawn)
+    scale, markup = slices.own_scale, as_html(drawn)
     ends = (u0, v0), (u1, v1)
     return SliceMap(axis, level, *ends, scale, markup, left_out, colouring, np.zeros(3))
 

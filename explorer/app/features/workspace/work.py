@@ -15,25 +15,26 @@ from explorer.app.features.workspace import slice_map as maps
 from explorer.app.scene.surfaces import PLAIN, Colouring, Measure, Shell, creased_faces
 from explorer.app.session.feed import watch_of
 from explorer.errors import ExplorerError, InputError
+from explorer.jobs.process import Channel
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Six
+from explorer.mechanism.machine import NO_LOAD, Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_apart, format_number
 from explorer.numerics.search import Watch, ignore_stage
-from explorer.page.session.worker import Channel
 from explorer.statics.reactions import has_limits
 from explorer.workspace.accessible.nodes import StartError
 from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
-from explorer.workspace.accessible.workspace import PairCost, accessible_workspace
+from explorer.workspace.accessible.workspace import PairCost, accessible_part
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.extremes import extent_of
-from explorer.workspace.faces.faces import Faces, workspace_faces
-from explorer.workspace.limits.constraints import HalfSpace, constraints
+from explorer.workspace.faces.faces import Faces, faces_within, workspace_faces
+from explorer.workspace.limits.constraints import HalfSpace
 from explorer.workspace.position_bands import PositionMeasure
-from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import NodeCount, Volume, node_count_of, volume_of
 from explorer.workspace.solids.solid import Solid, convex_hull, cut_solid
-from explorer.workspace.solids.solids import workspace_solid
+from explorer.workspace.solids.solids import whole_solid
+from explorer.workspace.workspace import Workspace
 
 Rows: TypeAlias = tuple[tuple[float, ...], ...]
 """Rows of a matrix."""
@@ -50,6 +51,12 @@ LIVE_TOLERANCE, PART_TOLERANCE = 0.004, 0.001
 STEP = "step"
 
 
+@lru_cache(CACHED)
+def kept_workspace(design: Design, rotation: Rows) -> Workspace:
+    """Return the workspace of a design, with all that has been computed of it."""
+    return Workspace(design, np.array(rotation))
+
+
 def rows_of(matrix: FloatArray) -> Rows:
     """Return the rows of a matrix (n, m) as plain numbers, which can be compared and hashed."""
     return tuple(tuple(row) for row in matrix.tolist())
@@ -64,15 +71,20 @@ class Selection:
         rotation: Rows of the matrix, platform to base.
         region: All that is within the limits, its accessible part, or the part that holds the load.
         start: Position where paths start; None for home.
-        load: (F; M) at the tool point besides the payload, base axes, in N and N × unit; None if
-            it does not matter.
+        load: (F; M) at the tool point besides the payload, base axes, in N and N × unit; none if it
+            does not matter.
     """
 
     design: Design
     rotation: Rows
     region: Region = "limits"
     start: Triple | None = None
-    load: Six | None = None
+    load: Six = NO_LOAD
+
+    @property
+    def workspace(self) -> Workspace:
+        """The workspace within the limits."""
+        return kept_workspace(self.design, self.rotation)
 
 
 @dataclass(frozen=True)
@@ -104,33 +116,23 @@ def trouble_of(error: ExplorerError) -> Trouble:
     return Trouble(error.in_millimetres, None if error.nearest is None else triple(error.nearest))
 
 
-_parts: dict[tuple[Selection, float], tuple[Part, Solid] | Trouble] = {}
-
-
 def find_part(selection: Selection, tolerance: float, watch: Watch) -> tuple[Part, Solid] | Trouble:
     """Return the part of a workspace that a region names, "accessible" or "held", or its trouble.
 
-    The newest few parts are cached. The tolerance is that of chords; `watch` gets each stage.
+    The tolerance is that of chords; `watch` gets each stage.
     """
-    key = selection, tolerance
-    part = _parts.pop(key, None)
-    if part is None:
-        find = _find_accessible if selection.region == "accessible" else _find_carried
-        part = find(selection, tolerance, watch)
-    _parts[key] = part
-    if len(_parts) > CACHED:
-        del _parts[next(iter(_parts))]
-    return part
+    if selection.region == "accessible":
+        return _find_accessible(selection, tolerance, watch)
+    return _find_carried(selection, tolerance)
 
 
 def _find_accessible(
     selection: Selection, tolerance: float, watch: Watch
 ) -> tuple[Part, Solid] | Trouble:
     try:
-        accessible = accessible_workspace(
-            selection.design,
-            np.array(selection.rotation),
-            start=selection.start,
+        accessible = accessible_part(
+            selection.workspace,
+            selection.start,
             most_nodes=MOST_LIVE_NODES,
             tolerance=tolerance,
             watch=watch,
@@ -141,15 +143,12 @@ def _find_accessible(
     return Part(accessible.accessible_volume, nodes, accessible.pairs), accessible.solid
 
 
-def _find_carried(selection: Selection, tolerance: float, _: Watch) -> tuple[Part, Solid] | Trouble:
-    load = (0.0,) * 6 if selection.load is None else selection.load
-    region = carried_region(
-        selection.design, np.array(selection.rotation), load, tolerance=tolerance
-    )
-    if region.volume == 0.0 or not region.solid.is_empty:
+def _find_carried(selection: Selection, tolerance: float) -> tuple[Part, Solid] | Trouble:
+    region = carried_region(selection.workspace, selection.load, tolerance=tolerance)
+    # Without a factor something holds the load, or the workspace is empty.
+    if region.factor is None:
         return Part(region.held_volume), region.solid
-    # Without a factor columns find a volume.
-    if region.factor is None or region.factor >= 1.0:
+    if region.factor >= 1.0:
         return Trouble("the positions that hold it are too few to be drawn")
     (limit,) = region.solid.empty_because
     percent = format_apart((100.0 * region.factor, 100.0), 3, format_number)[0]
@@ -157,12 +156,6 @@ def _find_carried(selection: Selection, tolerance: float, _: Watch) -> tuple[Par
         f"the best position found holds {percent} % of load and payload; {limit} is at its limit "
         "there"
     )
-
-
-@lru_cache(2 * CACHED)
-def _exact_volume(design: Design, rotation: Rows) -> Volume:
-    """Return the exact volume of a workspace, computed once for its number and its drawing."""
-    return workspace_volume(design, np.array(rotation))
 
 
 @dataclass(frozen=True)
@@ -175,7 +168,7 @@ class MeasuredVolume:
 
 def measure_volume(request: Selection) -> MeasuredVolume:
     """Return the volume of a workspace within the limits."""
-    return MeasuredVolume(request, _exact_volume(request.design, request.rotation))
+    return MeasuredVolume(request, volume_of(request.workspace))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,12 +192,6 @@ class WorkspaceRequest(Selection):
     tolerance: float
     hull: bool
     warn_below: float
-
-    @property
-    def selection(self) -> Selection:
-        """The workspace alone, without how it is drawn; a load that only colours it left out."""
-        load = self.load if self.region == "held" else None
-        return Selection(self.design, self.rotation, self.region, self.start, load)
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,12 +244,9 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
     The parent at a channel gets each `Stage`, and the `WorkspaceSurface` as soon as it is known,
     and may cancel.
     """
-    design, rotation = request.design, np.array(request.rotation)
-    load = (0.0,) * 6 if request.load is None else request.load
-    colouring = Colouring(design, rotation, request.colour, request.warn_below, np.array(load))
-    holds = request.region == "held"
-    on_map = replace(colouring, measure=map_measure(design, request.colour, holds=holds))
-    limits = constraints(design, rotation)
+    workspace, holds = request.workspace, request.region == "held"
+    colouring = Colouring(workspace, request.colour, request.warn_below, request.load)
+    on_map = replace(colouring, measure=map_measure(request.design, request.colour, holds=holds))
 
     def draw(faces: Faces) -> WorkspaceSurface:
         shells = colouring.shells(faces, holds=holds and trouble is None)
@@ -271,20 +255,19 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
             channel.send(surface)
         return surface
 
-    measured = _exact_volume(design, request.rotation)
     surface = None
     if request.region == "limits" and request.cut is None:
         # It is waited for; it needs none of what follows.
-        surface = draw(workspace_faces(limits))
-    whole = workspace_solid(design, rotation, request.tolerance, volume=measured)
+        surface = draw(workspace_faces(workspace))
+    whole = whole_solid(workspace, request.tolerance)
     solid, part, trouble = whole, None, None
     if request.region != "limits":
-        answer = find_part(request.selection, request.tolerance, watch_of(channel))
+        answer = find_part(request, request.tolerance, watch_of(channel))
         if isinstance(answer, Trouble):
             trouble = answer
         else:
             part, solid = answer
-    whole_extent = extent = None if whole.is_empty else extent_of(design, rotation)
+    whole_extent = extent = None if whole.is_empty else extent_of(workspace)
     if part is not None:
         extent = None if solid.is_empty else solid.ends
     shown, mapped, cut, level = solid, None, None, 0.0
@@ -293,17 +276,17 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         level = maps.level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
         side = -1.0 if maps.keeps_above(request.cut, request.flipped) else 1.0
         cut = HalfSpace(maps.CUT, side * np.eye(3)[axis], side * level)
-        limits = (*limits, cut)
         shown = solid if part is None else cut_solid(solid, cut)
     if surface is None:
-        surface = draw(workspace_faces(limits) if part is None else creased_faces(shown))
+        limits = workspace.limits if cut is None else (*workspace.limits, cut)
+        surface = draw(faces_within(limits) if part is None else creased_faces(shown))
     if cut is not None and request.cut is not None and whole_extent is not None:
         cut_solids = (None, None) if part is None else (cut_solid(whole, cut), shown)
         left_out = "load not held" if holds else "not accessible"
         mapped = maps.slice_map(on_map, whole_extent, request.cut, level, *cut_solids, left_out)
     hull = convex_hull(solid) if request.hull and not solid.is_empty else None
     try:
-        nodes = workspace_nodes(design, rotation)
+        nodes = node_count_of(workspace)
     except InputError:
         nodes = None
     return WorkspaceDrawing(
@@ -311,7 +294,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         surface=surface,
         hull=None if hull is None else Shell(PLAIN, hull.vertices, hull.faces),
         slice_map=mapped,
-        volume=measured.volume,
+        volume=volume_of(workspace).volume,
         part=part,
         trouble=trouble,
         mesh_volume=solid.volume,
@@ -328,9 +311,8 @@ def draw_radius_curve(request: Selection, channel: Channel | None = None) -> Rad
 
     The legs of the design have no radii.
     """
-    design, rotation = request.design, np.array(request.rotation)
     try:
-        return radius_curve(design, rotation, start=request.start, watch=watch_of(channel))
+        return radius_curve(request.workspace, start=request.start, watch=watch_of(channel))
     except ExplorerError as error:
         return trouble_of(error)
 
@@ -367,7 +349,7 @@ def export_mesh(
             library, or STEP of a solid without exact faces.
     """
     design, region = selection.design, selection.region
-    rotation, name = np.array(selection.rotation), file_words(region, what, offset)
+    name = file_words(region, what, offset)
     if file_format == STEP:
         if region != "limits":
             cause = "legs begin to collide" if region == "accessible" else "a part takes its limit"
@@ -378,14 +360,14 @@ def export_mesh(
             )
         from explorer.export.step import exact_workspace, step_bytes
 
-        exact = exact_workspace(design, rotation)
+        exact = exact_workspace(selection.workspace)
         if offset is not None:
             exact = exact.shift(design.unit_mm * np.array(offset))
         return step_bytes(exact, f"{name} of {design.name}")
     from explorer.export.mesh import mesh_bytes
 
     if region == "limits":
-        solid = workspace_solid(design, rotation, tolerance)
+        solid = whole_solid(selection.workspace, tolerance)
     else:
         answer = find_part(selection, tolerance, ignore_stage)
         if isinstance(answer, Trouble):
