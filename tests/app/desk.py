@@ -13,7 +13,9 @@ from typing import Any
 import msgspec
 import numpy as np
 import viser
+from page_widgets import widgets
 
+from explorer.app.features.feature import Services
 from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
@@ -22,7 +24,7 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.measures.field_words import message_of
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
-from explorer.page.widgets.assigning import Update
+from explorer.page.widgets.assigning import Assigner, Update
 
 
 class Browser:
@@ -129,6 +131,20 @@ def by_name(updates: Iterable[Update]) -> dict[str, dict[str, Any]]:
     for handle, name, value in updates:
         found.setdefault(handle.name, {})[name] = value
     return found
+
+
+def controls_of(services: Services, panel: Any, state: State) -> dict[str, Any]:
+    """Return the controls of a panel, visible or not, by their labels, set as in a state.
+
+    The panel is the last one that was made for its server.
+    """
+    Assigner(services.server).assign(panel.updates(Frame(state)))
+    return {widget.label: widget.handle for widget in widgets(services.server)}
+
+
+def markup_of(panel: Any, state: State) -> str:
+    """Return the markup that a panel shows in a state."""
+    return " ".join(str(v) for _, name, v in panel.updates(Frame(state)) if name == "content")
 
 
 def rows_of(html: str) -> list[list[str]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from desk import thick
+from desk import markup_of, thick
 from machines import FULL, OPTIMAL, PRECISE
 from services import services_for
 from workspace_feeds import draw
@@ -114,8 +114,7 @@ def test_panel_shows_the_blocks_of_its_answer(
     made, count = panel(services), 0
     for state in machine_states():
         frame = Frame(state)
-        updates = made.updates(frame)
-        shown = plain(" ".join(str(value) for _, name, value in updates if name == "content"))
+        shown = plain(markup_of(made, state))
         for block in answer(services, frame):
             assert plain(content_of(block, {})) in shown
             count += 1

@@ -14,10 +14,18 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 import viser
-from client import client_of, press_update, presses_in, wait_for
+from client import (
+    PATIENCE_SECONDS,
+    client_of,
+    press_update,
+    presses_in,
+    wait_for,
+    wait_until_heard,
+)
 from desk import CLIENT
 from page_props import shown_by
 from sample_states import iterates_of
+from server_clock import settle
 from socket_tab import SocketTab
 
 from explorer.app.features.compare.state import SLOTS, Compared
@@ -32,17 +40,15 @@ from explorer.app.inputs.controls import MAIN
 from explorer.app.server import Running
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import Open, Set
-from explorer.app.state.moves import SetJoint, SetPosition
+from explorer.app.state.moves import GoHome, SetJoint, SetPosition
 from explorer.app.widgets.buttons import Buttons, extra_button, press_button
 from explorer.files.extras import EXTRAS, LINUX_ALONE, install_command
 from explorer.files.packaged import SOURCES
 from explorer.measures.blocks.block import Look
 from explorer.mechanism.design_file import PRESETS
 from explorer.page import look
-from explorer.page.browser import viser_gaps
-from explorer.page.browser.viser_gaps import PLACE
 from explorer.page.widgets import assigning
-from explorer.page.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
+from explorer.page.widgets.assigning import Assigner
 
 pytestmark = pytest.mark.usefixtures("idle_jobs")
 
@@ -169,37 +175,37 @@ def test_every_class_of_the_markup_has_a_rule_and_every_rule_a_class() -> None:
     assert ruled <= used | looks
 
 
-def filled_in(container: Any) -> list[str]:
-    """Return the filled buttons that are visible in a container, by their words or markup."""
-    found: list[str] = []
-    for handle in container._children.values():
-        props = handle._impl.props
-        if not getattr(props, "visible", True):
-            continue
-        if isinstance(handle, viser.GuiHtmlHandle):
-            found += [FILLED] * handle.content.count(FILLED)
-        elif isinstance(handle, viser.GuiButtonHandle):
-            found += [handle.label] * (handle.color == MAIN and not handle.disabled)
-        if hasattr(handle, "_children"):
-            found += filled_in(handle)
+def filled_by_place(running: Running) -> dict[str, list[str]]:
+    """Return the words or markup of the filled buttons that a browser sees in each tab and dialog.
+
+    Those of the bar, which is in none, are that of an empty name.
+    """
+    with client_of(running) as client:
+        client.read_all_sent(running)
+        controls = client.controls
+    titles: dict[str, str] = {}
+    for props in controls.values():
+        titles |= zip(
+            props.get("_tab_container_ids", ()), props.get("_tab_labels", ()), strict=True
+        )
+    found: dict[str, list[str]] = {title: [] for title in ("", *titles.values())}
+    for props in controls.values():
+        filled = [FILLED] * str(props.get("content")).count(FILLED)
+        if props.get("color") == MAIN and not props["disabled"]:
+            filled.append(props["label"])
+        place = props
+        while place["visible"] and place.get("container_uuid") in controls:
+            place = controls[place["container_uuid"]]
+        if place["visible"]:
+            found[titles.get(place.get("container_uuid", ""), "")] += filled
     return found
-
-
-def filled_by_tab(running: Running) -> dict[str, list[str]]:
-    """Return the filled buttons of each tab and dialog, by its title, and those of the bar."""
-    gui: Any = running.viser.gui
-    panels: dict[str, list[str]] = {"bar": filled_in(gui._container_handle_from_uuid["root"])}
-    for handle in gui._panel_handle_from_uuid.values():
-        for label, tab in zip(handle._tab_labels, handle._tab_handles, strict=True):
-            panels[label] = filled_in(tab)
-    return panels
 
 
 def check_filled(running: Running, *expected: str) -> None:
     """Check that no place has two filled buttons, and that the expected ones have one."""
     assert running.page.session.wait_until_idle()
-    found = filled_by_tab(running)
-    assert {"bar", "Pose", "Optimise", "Export", "Designs"} <= found.keys()
+    found = filled_by_place(running)
+    assert {"Pose", "Optimise", "Export", "Designs"} <= found.keys()
     assert {place: each for place, each in found.items() if len(each) > 1} == {}
     assert {place for place in expected if not found[place]} == set()
 
@@ -277,85 +283,45 @@ def test_value_that_a_user_sets_while_a_frame_is_computed_stays(server: viser.Vi
         assert slider.value == expected
 
 
-@pytest.mark.parametrize("name", ["value", "position"])
-def test_value_that_crossed_with_the_user_is_sent_again_when_the_user_rests(
-    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch, name: str
+@pytest.mark.parametrize("seconds", [3600.0, -1.0])
+def test_browser_is_told_again_once_of_what_crossed_with_its_user_and_of_nothing_else(
+    running: Running, monkeypatch: pytest.MonkeyPatch, seconds: float
 ) -> None:
-    handle: Any
-    if name == "value":
-        handle = server.gui.add_slider("crossed", min=0.0, max=9.0, step=0.1, initial_value=1.0)
-        first, second, state = 2.0, 7.0, handle._impl
-    else:
-        handle = server.scene.add_transform_controls("/crossed")
-        first, second, state = (2.0, 0.0, 0.0), (7.0, 0.0, 0.0), handle._impl_aux
-    assigner, sent, now = Assigner(server), list[object](), 1000.0
-    monkeypatch.setattr(assigning.time, "time", lambda: now)
-
-    def resend(handle: object, name: str) -> None:
-        sent.append(getattr(handle, name))
-
-    monkeypatch.setattr(assigning, "resend", resend)
-
-    def draw(value: object, seconds: float) -> bool:
-        nonlocal now
-        now += seconds
-        assigner.assign([(handle, name, np.array(value) if name in PLACE else value)])
-        return assigner.resend_crossed()
-
-    def use(value: object, seconds: float) -> None:
-        nonlocal now
-        now += seconds
-        if name == "value":
-            state.value, state.update_timestamp = value, now
-            viser_gaps.resend(handle, name)
-        else:
-            state.last_updated, handle.position[:] = now, value
-
-    # Nobody has touched it.
-    assert not draw(first, 1.0)
-    # A user did, before the browser can have shown that.
-    use(second, 0.3)
-    assert draw(second, 0.1)
-    assert sent == []
-    assert not draw(second, QUIET_SECONDS)
-    np.testing.assert_array_equal(sent, [second])
-    # Once is enough, unless that crosses too.
-    assert not draw(second, 0.1)
-    use(first, 0.1)
-    assert draw(first, 0.1)
-    assert not draw(first, QUIET_SECONDS)
-    assert len(sent) == 2
-    # What a user sets long after is what the browser shows.
-    assert not draw(second, 1.0)
-    use(first, CROSSING_SECONDS + 0.1)
-    assert not draw(first, 2.0 * QUIET_SECONDS)
-    assert len(sent) == 2
-
-
-def test_browser_that_crossed_with_the_explorer_shows_what_its_user_set(
-    running: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page = running.page
-    # However slow the machine is, the browser's answer counts as one that crossed.
-    monkeypatch.setattr(assigning, "CROSSING_SECONDS", 3600.0)
+    page, session = running.page, running.page.session
+    # However slow the machine is, the browser's answer counts as one that crossed, or as none.
+    monkeypatch.setattr(assigning, "CROSSING_SECONDS", seconds)
+    session.do(GoHome())
     with client_of(running) as client:
-        uuid = client.find("x")
-        values: list[float] = []
+        slider = client.find("x")
 
-        def read_until(value: float) -> None:
-            while values[-1:] != [value]:
-                values.extend(
-                    message["updates"]["value"]
-                    for message in client.read()
-                    if message.get("uuid") == uuid and "value" in message.get("updates", {})
-                )
+        def told() -> tuple[list[float], list[list[float]]]:
+            """Return what the browser is told of the slider and of the gizmo, once all rests."""
+            assert settle(page, PATIENCE_SECONDS)
+            messages = client.read_all_sent(running)
+            of_slider = [m["updates"] for m in messages if m.get("uuid") == slider]
+            of_gizmo = [m for m in messages if m.get("name") == "/handle"]
+            values = [each["value"] for each in of_slider if "value" in each]
+            return values, [list(each["position"]) for each in of_gizmo if "position" in each]
 
+        told()
+        session.do(SetPosition(0, 11.5))
+        values, places = told()
+        assert values == [115.0]
+        (place,) = places
         # Told of one value, it sends another before it has shown that.
-        page.session.do(SetPosition(0, 11.5))
-        read_until(115.0)
-        client.update(uuid, 125.0)
-        read_until(125.0)
-        assert page.session.state.position[0] == 12.5
+        client.update(slider, 125.0)
+        wait_until_heard(running, client)
+        values, places = told()
+        assert values == [125.0] * (seconds > 0.0)
+        assert session.state.position[0] == 12.5
+        (place,) = places
+        moved = [place[0] + 1.5, *place[1:]]
+        gizmo = {"type": "TransformControlsUpdateMessage", "name": "/handle", "owner": ""}
+        client.send(gizmo | {"position": moved, "wxyz": session.state.pose.quaternion})
+        wait_until_heard(running, client)
+        values, places = told()
+        assert places == [moved] * (seconds > 0.0)
+        assert session.state.position[0] > 12.5
 
 
 def test_panels_that_a_drag_leaves_no_time_for_are_drawn_with_the_next_frame(

@@ -159,7 +159,7 @@ def _margins(folds: tuple[float, ...]) -> list[float]:
 # The sliders
 
 
-def shown(panel: MovePanel, desk: Desk) -> dict[str, Any]:
+def sliders_of(panel: MovePanel, desk: Desk) -> dict[str, Any]:
     """Return the visible sliders by their labels, after a panel has shown the state."""
     found: dict[str, Any] = {}
     for handle, name, value in panel.updates(Frame(desk.state)):
@@ -173,7 +173,7 @@ def test_choice_shows_six_sliders_in_place_of_six_and_is_kept(
     services: Services, desk: Desk
 ) -> None:
     panel = MovePanel(services)
-    by_position = list(shown(panel, desk))
+    by_position = list(sliders_of(panel, desk))
     assert by_position == ["x", "y", "z", "yaw (°)", "pitch (°)", "roll (°)"]
     before = desk.state
     desk.press(services.buttons, "view.coordinates", "folds")
@@ -182,15 +182,22 @@ def test_choice_shows_six_sliders_in_place_of_six_and_is_kept(
     assert replace(after, view=before.view) == before
     # Like all that is shown it is no step of its own.
     assert desk.session.history.at == 0
-    assert list(shown(panel, desk)) == ["r", "β (°)", "ε (°)", "φ1 (°)", "φ2 (°)", "φ3 (°)"]
+    assert list(sliders_of(panel, desk)) == [
+        "r",
+        "β (°)",
+        "ε (°)",
+        "φ1 (°)",
+        "φ2 (°)",
+        "φ3 (°)",
+    ]
     desk.press(services.buttons, "view.coordinates", "lengths")
-    assert list(shown(panel, desk)) == list(JOINT_LABELS.values())
+    assert list(sliders_of(panel, desk)) == list(JOINT_LABELS.values())
     # It stays with the next design, and in the file of the session.
     assert Open(PRESETS["paper-initial"]).apply(after).view.coordinates == "folds"
     saved = decode_session(encode_session(start_history(after)), "test")
     assert saved.step.state.view.coordinates == "folds"
     desk.press(services.buttons, "view.coordinates", "position")
-    assert list(shown(panel, desk)) == by_position
+    assert list(sliders_of(panel, desk)) == by_position
 
 
 def test_slider_sets_a_fold_within_the_walls_of_the_mode_and_is_undone(
@@ -200,7 +207,7 @@ def test_slider_sets_a_fold_within_the_walls_of_the_mode_and_is_undone(
     desk.session.do(Set("view.coordinates", "folds"))
     for mode in range(8):
         desk.session.do(SetMode(mode))
-        sliders = shown(panel, desk)
+        sliders = sliders_of(panel, desk)
         for index, sign in enumerate(signs_of(mode), start=1):
             slider = sliders[f"φ{index} (°)"]
             assert (slider.min, slider.max) == ((0.0, 180.0) if sign > 0 else (-180.0, 0.0))
@@ -209,18 +216,18 @@ def test_slider_sets_a_fold_within_the_walls_of_the_mode_and_is_undone(
         assert sliders["r"].min == 0.0
     desk.session.do(SetMode(1))
     before = desk.state
-    slider = shown(panel, desk)["φ2 (°)"]
+    slider = sliders_of(panel, desk)["φ2 (°)"]
     desk.use(slider, -45.0)
     assert folds_of(desk.state)[4] == -45.0
     assert desk.session.history.step.words == "φ2 = −45°"
     desk.session.do(UNDO)
     assert replace(desk.state, gesture=None) == replace(before, gesture=None)
     # A number that is typed may lie beyond the wall; the slider's ends are those of its mode.
-    desk.use(shown(panel, desk)["φ2 (°)"], 45.0)
+    desk.use(sliders_of(panel, desk)["φ2 (°)"], 45.0)
     assert desk.state.mode == 3
-    slider = shown(panel, desk)["φ2 (°)"]
+    slider = sliders_of(panel, desk)["φ2 (°)"]
     assert (slider.min, slider.max, slider.value) == (0.0, 180.0, 45.0)
-    desk.use(shown(panel, desk)["r"], 12.0)
+    desk.use(sliders_of(panel, desk)["r"], 12.0)
     assert folds_of(desk.state)[0] == 12.0
     assert desk.session.history.step.words == "r = 12 units"
 

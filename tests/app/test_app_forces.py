@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 import pytest
 import viser
-from desk import Desk, by_name
+from desk import Desk, by_name, markup_of
 from services import StubJobs, services_for
 
 from explorer import Actuators, Guide, Payload, Struts, Tolerances, Tool
@@ -139,12 +139,12 @@ def test_nearest_position_that_holds_the_load_is_searched_and_gone_to(
     show_in(desk, loaded_state(force=(0.0, 0.0, -25.0)))
     frame = Frame(desk.state)
     feed.follow(frame)
-    assert "searching" in markup(panel, frame.state)
+    assert "searching" in markup_of(panel, frame.state)
     jobs.work()
     drawing = feed.drawing
     assert drawing is not None
     assert drawing.pose is not None
-    assert "mm from here" in markup(panel, frame.state)
+    assert "mm from here" in markup_of(panel, frame.state)
     desk.press(buttons, "forces.go")
     assert desk.state.pose == drawing.pose
     assert services.get(Loads).of(Frame(desk.state)).share <= 1.0
@@ -265,11 +265,6 @@ def state_with(design: Design = TYPICAL_DESIGN, **precision: Any) -> State:
     return Set("view", view).apply(state)
 
 
-def markup(panel: Any, state: State) -> str:
-    """Return the markup of a panel."""
-    return " ".join(str(v) for _, name, v in panel.updates(Frame(state)) if name == "content")
-
-
 def words(html: str) -> str:
     return re.sub("<[^>]+>", " ", html)
 
@@ -291,7 +286,7 @@ def test_panel_has_the_numbers_of_the_pose(services: Services) -> None:
     state = state_with()
     precision = services.get(Loads).precision(Frame(state))
     worst, rms = precision.worst(), precision.rms()
-    text = words(markup(PrecisionPanel(services), state))
+    text = words(markup_of(PrecisionPanel(services), state))
     for value in (10.0 * worst.displacement, 10.0 * rms.displacement):
         assert f"{float(value):.2f} mm" in text
     assert f"{math.degrees(float(worst.turn)):.3g}°" in text
@@ -308,21 +303,21 @@ def test_design_without_load_and_limits_is_told_what_to_enter(
     services: Services, desk: Desk
 ) -> None:
     panel = ForcesPanel(services)
-    assert "No load acts" in markup(panel, desk.state)
+    assert "No load acts" in markup_of(panel, desk.state)
     desk.press(services.buttons, "forces.typical")
     assert limited_parts(desk.state.design).all()
-    assert "Assume" not in markup(panel, desk.state)
+    assert "Assume" not in markup_of(panel, desk.state)
     assert services.get(load_figure)(Frame(desk.state)) == ""
     desk.session.do(SetForce((0.0, 0.0, -10.0)))
-    assert "Holds the load" in markup(panel, desk.state)
+    assert "Holds the load" in markup_of(panel, desk.state)
 
 
 def test_ideal_design_is_offered_typical_values(services: Services, desk: Desk) -> None:
     panel = PrecisionPanel(services)
-    assert "states no errors" in markup(panel, desk.state)
+    assert "states no errors" in markup_of(panel, desk.state)
     desk.press(services.buttons, "precision.typical")
     assert desk.state.design == typical_machine(OPTIMAL)[0]
-    assert "Assume" not in markup(panel, desk.state)
+    assert "Assume" not in markup_of(panel, desk.state)
     # What the design states stays.
     actuators = Actuators(error_mm=(0.0, 0.0, 0.01, 0.0, 0.0, 0.0))
     tolerances = Tolerances(b4=(0.0, 0.0, 0.2))
@@ -335,7 +330,7 @@ def test_ideal_design_is_offered_typical_values(services: Services, desk: Desk) 
 
 def test_scene_of_a_singular_pose_is_empty(services: Services) -> None:
     state = replace(state_with(ellipsoid=True, deflected=True), pose=SINGULAR_POSE)
-    text = words(markup(PrecisionPanel(services), state))
+    text = words(markup_of(PrecisionPanel(services), state))
     assert "nan" not in text
     assert text.count("singular") == 2
     assert "mm/N" not in text
@@ -400,7 +395,7 @@ def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
     part = PrecisionPanel(services)
     before = desk.state.design
     services.get(BUDGET_FEED).follow(Frame(desk.state))
-    text = markup(part, desk.state)
+    text = markup_of(part, desk.state)
     drawing = budget_of(budget_request(desk.state))
     assert drawing.found is not None
     assert drawing.costs.worst_displacement <= 0.5
@@ -429,7 +424,7 @@ def test_budget_that_cannot_be_kept_is_reported_in_one_line(
     part, before = PrecisionPanel(services), desk.state
     services.get(BUDGET_FEED).follow(Frame(before))
     jobs.work()
-    text = words(markup(part, before))
+    text = words(markup_of(part, before))
     assert "There is no budget" in text
     assert "actuators" in text
     desk.press(buttons, "precision.set")
@@ -449,7 +444,7 @@ def test_table_has_every_source_with_its_part() -> None:
 def test_source_that_only_turns_the_tool_is_listed(services: Services) -> None:
     errors = Actuators(error_mm=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
     state = state_with(msgspec.structs.replace(OPTIMAL, actuators=errors))
-    text = words(markup(PrecisionPanel(services), state))
+    text = words(markup_of(PrecisionPanel(services), state))
     assert re.search(r"By source\s+l1\s+0(\.0+)? mm", text)
     drawing = budget_of(budget_request(state))
     rows = render(tolerance_budget(drawing.costs, drawing.found))

@@ -13,6 +13,7 @@ import pytest
 import viser
 from desk import Desk
 from hypothesis import given, strategies as st
+from page_widgets import widgets
 
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.feature import MachinePanel
@@ -245,14 +246,10 @@ CODE = re.compile(r"[a-z]_[a-z]|[a-z]\.[a-z]|\bnull\b|\bNone\b")
 BAD = (-1.0, 0.0, 181.0, 1e9, 1e45)
 
 
-def test_refusals_of_the_page_hold_no_names_of_the_code(
-    server: viser.ViserServer, desk: Desk, services: Services
-) -> None:
-    gui: Any = server.gui
-    before = set(gui._gui_input_handle_from_uuid)
+def test_refusals_of_the_page_hold_no_names_of_the_code(desk: Desk, services: Services) -> None:
     for panel in (DesignPanel, MovePanel, MachinePanel):
         panel(services)
-    handles = [h for u, h in gui._gui_input_handle_from_uuid.items() if u not in before]
+    handles = [each.handle for each in widgets(services.server)]
     start = desk.state
     for handle in handles:
         values: list[object] = []

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from desk import Desk, by_name, viewed
+from desk import Desk, by_name, controls_of, markup_of, viewed
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -49,21 +49,15 @@ class Hand:
     """A hand that uses the controls of the panel by their labels."""
 
     def __init__(self, services: Services, desk: Desk) -> None:
-        gui: Any = services.gui
-        before = set(gui._gui_input_handle_from_uuid)
-        self._desk, self._panel = desk, MachinePanel(services)
-        new = {u: h for u, h in gui._gui_input_handle_from_uuid.items() if u not in before}
-        self.controls: dict[str, Any] = {handle.label: handle for handle in new.values()}
-        assert len(self.controls) == len(new)
+        self._desk, self._services, self._panel = desk, services, MachinePanel(services)
+        self.controls: dict[str, Any] = {}
         self.show()
 
     def show(self) -> str:
         """Show the state, and return the markup of the panel."""
-        texts: list[str] = []
-        for handle, name, value in self._panel.updates(Frame(self._desk.state)):
-            setattr(handle, name, value)
-            texts += [str(value)] * (name == "content")
-        return " ".join(texts)
+        state = self._desk.state
+        self.controls = controls_of(self._services, self._panel, state)
+        return markup_of(self._panel, state)
 
     def set(self, label: str, value: object) -> Design:
         """Set a control, and return the design after it is shown."""

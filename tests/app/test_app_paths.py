@@ -16,8 +16,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 import pytest
-from desk import Desk
-from page_widgets import widgets
+from desk import Desk, controls_of
 from services import StubDownloads, StubJobs, services_for
 
 from explorer.app.features.feature import Services
@@ -71,7 +70,6 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS
-from explorer.page.widgets.assigning import Assigner
 from explorer.paths.loads import path_loads
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
@@ -382,14 +380,6 @@ def test_plan_that_comes_late_or_for_another_design_is_not_taken() -> None:
 # The panel
 
 
-def controls_of(services: Services, panel: PathsPanel, state: State) -> dict[str, Any]:
-    """Return the controls that are visible in a state, by their labels, set as in it."""
-    Assigner(services.server).assign(panel.updates(Frame(state)))
-    # Of panels of other tests on this server the last one counts.
-    last = {widget.label: widget.handle for widget in widgets(services.server)}
-    return {label: handle for label, handle in last.items() if handle.visible}
-
-
 def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) -> None:
     paths, buttons = PathsPanel(services), services.buttons
     time_slider = paths.time.handle
@@ -444,7 +434,8 @@ def test_end_is_the_present_pose_a_mode_or_six_numbers(
     desk.session.do(SetPose(TILTED))
 
     def controls() -> dict[str, Any]:
-        return controls_of(services, paths, desk.state)
+        controls = controls_of(services, paths, desk.state)
+        return {label: handle for label, handle in controls.items() if handle.visible}
 
     def numbers() -> Pose:
         return ends_of(desk.state)[ENDS.index(end)]

@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 import trimesh
 import viser
-from desk import Desk, ScriptedBrowser, by_name, number, rows_of
+from desk import Desk, ScriptedBrowser, by_name, controls_of, markup_of, number, rows_of
 from hypothesis import given, strategies as st
-from page_widgets import widgets
 from services import StubDownloads, StubJobs
 from strategies import Case, all_cases
 from workspace_feeds import draw
@@ -72,7 +71,6 @@ from explorer.mechanism.machine import Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
-from explorer.page.widgets.assigning import Assigner
 from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -135,8 +133,7 @@ def test_choice_of_the_point_is_one_step_that_can_be_undone(desk: Desk, services
     panel = MovePanel(services)
 
     def has_tool_disabled() -> bool:
-        updates = panel.updates(Frame(desk.state))
-        markup = "".join(str(v) for _, name, v in updates if name == "content")
+        markup = markup_of(panel, desk.state)
         return "disabled" in re.findall(r"<button[^>]*view\.at.*?</button>", markup)[1]
 
     assert has_tool_disabled()
@@ -156,8 +153,7 @@ def test_sliders_show_and_set_the_tool(desk: Desk, services: Services) -> None:
     desk.session.do(Set("view.at", "tool"))
 
     def sliders() -> dict[str, Any]:
-        Assigner(services.server).assign(panel.updates(Frame(desk.state)))
-        return {widget.label: widget.handle for widget in widgets(services.server)}
+        return controls_of(services, panel, desk.state)
 
     shown = [sliders()[name].value for name in "xyz"]
     np.testing.assert_allclose(shown, tool_of(desk.state), atol=1e-12)
@@ -298,8 +294,7 @@ def test_typed_end_of_a_path_is_where_the_tool_is(services: Services, desk: Desk
     desk.session.do(Set("view.at", "tool"))
 
     def controls() -> dict[str, Any]:
-        Assigner(services.server).assign(panel.updates(Frame(desk.state)))
-        return {widget.label: widget.handle for widget in widgets(services.server)}
+        return controls_of(services, panel, desk.state)
 
     def typed() -> State:
         pose = getattr(Paths.of(desk.state), end.lower())
@@ -378,7 +373,7 @@ def test_drawn_solid_and_hull_are_those_of_b4_moved_by_the_arm(
     rows = rows_of(workspace_details(Frame(state), services.get(WORKSPACE_FEED)))
     extents = [row[1] for row in rows if row[0].startswith("Extent of the tool")]
     numbers = [
-        [number(end) for end in text.removesuffix(" units").split(" … ")] for text in extents
+        [number(end) for end in text.removesuffix(" units  ").split(" … ")] for text in extents
     ]
     np.testing.assert_allclose(numbers, ends.T, atol=0.05)
 
@@ -539,9 +534,7 @@ def test_tab_of_tilts_has_the_largest_tilt_about_the_tool(services: Services) ->
     panel = OrientationPanel(services)
 
     def largest_tilt(state: State) -> str:
-        updates = panel.updates(Frame(state))
-        markup = " ".join(str(v) for _, name, v in updates if name == "content")
-        return re.findall(r'ex-large">([\d.]+)°', markup)[0]
+        return re.findall(r'ex-large">([\d.]+)°', markup_of(panel, state))[0]
 
     over = Set("view.orientation.over", "total").apply(state)
     assert draw(services, RANGE_FEED, over).request.tool == (0.5, 0.0, 2.0)

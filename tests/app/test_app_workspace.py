@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 import pytest
 import trimesh
-from desk import CLIENT, Desk, ScriptedBrowser
+from desk import CLIENT, Desk, ScriptedBrowser, markup_of
 from machines import six
 from services import StubDownloads, services_for
 from workspace_feeds import drawing_of, follow
@@ -265,7 +265,7 @@ def test_legend_names_the_measure_of_the_map_and_the_levels_of_its_bands(
 ) -> None:
     state = load_state(region=region, colour=colour, cut="y")
     follow(services, state)
-    text = panel_text(WorkspacePanel(services), state)
+    text = markup_of(WorkspacePanel(services), state)
     mapped = drawing_of(state).slice_map
     assert mapped is not None
     name, read, factor = {
@@ -374,11 +374,6 @@ def measured(design: Design, colour: str, points: FloatArray, rotation: FloatArr
     return np.asarray(of_parts.max(axis=-1))
 
 
-def panel_text(panel: WorkspacePanel, state: State) -> str:
-    """Return the markup of the panel in a state."""
-    return "".join(str(v) for _, name, v in panel.updates(Frame(state)) if name == "content")
-
-
 # The bands
 
 
@@ -484,7 +479,7 @@ def test_map_is_read_to_the_browser_that_asks(services: Services) -> None:
     # There is no map before the panel has shown it.
     services.buttons.press("workspace.read", place, client)
     assert asking.scripts == []
-    assert "data-map" in panel_text(panel, state)
+    assert "data-map" in markup_of(panel, state)
     for text in ("[12.5,5]", "[NaN,1,2]", place):
         services.buttons.press("workspace.read", text, client)
     (script,) = asking.scripts
@@ -544,9 +539,9 @@ def test_colour_that_a_design_states_nothing_of_asks_for_what_it_needs(
     request = feeds.workspace_request(Frame(desk.state))
     assert request is not None
     assert request.colour == "plain"
-    assert words in panel_text(panel, desk.state)
+    assert words in markup_of(panel, desk.state)
     desk.session.do(Set("view.workspace.colour", "force"))
-    assert words not in panel_text(panel, desk.state)
+    assert words not in markup_of(panel, desk.state)
 
 
 # The part that holds the load
@@ -595,7 +590,7 @@ def test_load_that_nothing_holds_names_the_part(services: Services) -> None:
     assert drawing is not None
     assert drawing.trouble is not None
     assert re.search(r"payload; actuator \w+ is at its limit there", drawing.trouble.reason)
-    text = panel_text(WorkspacePanel(services), state)
+    text = markup_of(WorkspacePanel(services), state)
     assert text.count("No position holds the load") == 1
     # All within the limits is drawn instead.
     assert drawing.mesh_volume == pytest.approx(drawing.volume, rel=0.02)
