@@ -17,6 +17,7 @@ from scipy.optimize import linprog
 from explorer import Actuators, Design, InputError, actuator_forces
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Swing
+from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.motion.weights import MovingBodies, payload_wrench
@@ -35,7 +36,9 @@ from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, largest_deflection, stiffness_of
 from explorer.statics.reactions import largest_accelerations, limit_shares, part_limits, reactions
 from explorer.workspace.clearance_bounds import least_in_workspace
+from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid, violations
+from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -279,6 +282,25 @@ def test_bound_by_duality_is_below_the_least_value_of_a_linear_programme(
         assert bound <= value + least.fun + 1e-9
         if count <= 1:
             assert bound == pytest.approx(value + least.fun, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", long_after(4, range(12)))
+def test_least_clearances_off_singular_planes_are_those_of_a_design_with_that_margin(
+    seed: int,
+) -> None:
+    design, rotation = ordinary_case(seed)
+    margin, tolerance, below = (share * design.reach for share in (0.05, 1e-3, 0.1))
+    free = Workspace(limited(design, margin=0.0), rotation)
+    found = least_clearances(free, tolerance, margin=margin)
+    demanded = least_clearances(Workspace(limited(design, margin=margin), rotation), tolerance)
+    assert found.clearance == pytest.approx(demanded.clearance, abs=tolerance)
+    near = least_clearances(free, tolerance, margin=margin, below=below)
+    is_near = np.isfinite(near.clearance)
+    assert (is_near == (demanded.clearance < below)).all()
+    assert near.clearance[is_near] == pytest.approx(demanded.clearance[is_near], abs=tolerance)
+    for position in (found.position, near.position[is_near]):
+        sizes = np.abs(margins(position, rotation))
+        assert (sizes >= margin * (1.0 - 1e-6)).all()
 
 
 def test_parts_without_a_limit_have_nothing_to_prove() -> None:
