@@ -215,7 +215,7 @@ def test_drawing_with_another_cut_colour_or_hull_computes_no_workspace_anew(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     drawing_of(THICK)
-    monkeypatch.setattr(work, "accessible_workspace", pytest.fail)
+    monkeypatch.setattr("explorer.workspace.accessible.workspace._Carver", pytest.fail)
     for changes in ({"cut": "x", "level": 3.0}, {"colour": "margin"}, {"hull": True}):
         assert drawing_of(show(THICK, **changes)).part is not None
 

@@ -59,7 +59,7 @@ def test_workspace_disagreeing_mesh_is_reported(
     def make(*_args: object, **_options: object) -> Solid:
         return wrong
 
-    monkeypatch.setattr("explorer.workspace.solids.solids.workspace_solid", make)
+    monkeypatch.setattr("explorer.workspace.solids.solids.whole_solid", make)
     assert cli.answer()["mesh_agrees"] is False
     assert "its volume does not agree with the exact one" in cli.text()
 
