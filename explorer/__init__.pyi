@@ -67,6 +67,7 @@ from .workspace.orientations.share import orientation_capability as orientation_
 from .workspace.orientations.tilts import greatest_tilt as greatest_tilt
 from .workspace.slices.volume import workspace_volume as workspace_volume
 from .workspace.solids.solids import workspace_solid as workspace_solid
+from .workspace.workspace import Workspace as Workspace
 
 __all__: list[str]
 __version__: str
