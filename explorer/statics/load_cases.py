@@ -11,6 +11,7 @@ little before it. The plane itself is a limit of the workspace.
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -38,6 +39,9 @@ PARTS = 10
 # Places in the row of numbers that the kernels take, see `load_case`.
 TOOL, WRENCH, FORCE, LIMITS, INWARD = 6, 9, 15, 16, 36
 
+Forces: TypeAlias = tuple[float, float, float, float, float, float]
+"""Six numbers in the order of `explorer.mechanism.design.JOINTS`."""
+
 
 def load_case(
     design: Design, rotation: FloatArray, load: FloatArray, limits: FloatArray | None = None
@@ -63,15 +67,14 @@ def load_case(
 
 
 @helper
-def write_shares(case: FloatArray, r: FloatArray, p: FloatArray, out: FloatArray) -> None:
-    """Write the shares of all limits at a position, shape (20,), infinite if it is singular."""
-    x = case[:TOOL]
-    if is_singular(x, p, r):
-        for i in range(2 * PARTS):
-            out[i] = math.inf
-        return
-    t, w = case[TOOL:WRENCH], case[WRENCH:FORCE]
-    force, limits = case[FORCE], case[LIMITS:INWARD]
+def forces_at(
+    case: FloatArray, r: FloatArray, p: FloatArray
+) -> tuple[Forces, Forces, float, float]:
+    """Return what acts in a regular position: actuator forces, their spreads, d2 and d4.
+
+    A spread is the most by which the force of any direction increases a force.
+    """
+    x, t, w, force = case[:TOOL], case[TOOL:WRENCH], case[WRENCH:FORCE], case[FORCE]
     f = holding_forces(x, p, r, (w[0], w[1], w[2]), (w[3], w[4], w[5]))
     e = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if force > 0.0:
@@ -88,6 +91,18 @@ def write_shares(case: FloatArray, r: FloatArray, p: FloatArray, out: FloatArray
         )
     d2 = norm3((0.0, p[1] + x[B2] * r[1, 0], p[2] + x[B2] * r[2, 0]))
     d4 = norm3((0.0, p[1] + x[B3] * r[1, 0], p[2] + x[B3] * r[2, 0]))
+    return f, e, d2, d4
+
+
+@helper
+def write_shares(case: FloatArray, r: FloatArray, p: FloatArray, out: FloatArray) -> None:
+    """Write the shares of all limits at a position, shape (20,), infinite if it is singular."""
+    if is_singular(case[:TOOL], p, r):
+        for i in range(2 * PARTS):
+            out[i] = math.inf
+        return
+    limits = case[LIMITS:INWARD]
+    f, e, d2, d4 = forces_at(case, r, p)
     values = (f[0], f[1], f[2], f[3], f[4], f[5], f[1] * d2, f[3] * d4, f[2], f[4])
     spreads = (e[0], e[1], e[2], e[3], e[4], e[5], e[1] * d2, e[3] * d4, e[2], e[4])
     for i in range(PARTS):

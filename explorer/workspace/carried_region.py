@@ -1,18 +1,19 @@
-"""The carried region: the part of a workspace in which the machine carries a load, as a solid.
+"""The carried region: the part of a workspace in which the machine carries a load, and its solid.
 
-Each limit of a part of the machine is a surface of its own, which is smooth where it bounds the
-workspace. A grid of positions finds it, and each of its vertices is moved onto the true surface, so
-that only the flatness of the faces between vertices is approximate. Booleans cut one surface after
-the other out of the workspace, so that creases between limits and parts that are thinner than a
-cell of the grid are kept.
+Its volume is that of columns (`explorer.workspace.slices.columns`). For the solid each limit of a
+part of the machine is a surface of its own, which is smooth where it bounds the workspace. A grid
+of positions finds it, and each of its vertices is moved onto the true surface, so that only the
+flatness of the faces between vertices is approximate. Booleans cut one surface after the other out
+of the workspace, so that creases between limits and parts that are thinner than a cell of the grid
+are kept.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from explorer.statics import load_cases
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.nodes import Grid, make_grid
 from explorer.workspace.limits.constraints import Cone, HalfSpace
+from explorer.workspace.slices.columns import ColumnVolume, volume_of_columns
 from explorer.workspace.slices.volume import volume_of
 from explorer.workspace.solids.solid import Solid, Surface, carved_solid, cut_solid
 from explorer.workspace.solids.solids import whole_solid
@@ -35,20 +37,27 @@ from explorer.workspace.workspace import Workspace
 # nodes beyond it on either side.
 NODES = 20
 BEYOND = 2
-# Nodes on each axis of the grid that finds the box of the part, and steps of that about them.
-COARSE, AROUND = 20, 2.0
+# Nodes on each axis of the grid on which the best position is sought at first.
+COARSE = 20
 # To find the best position: numbers of starts, of steps of that grid between them, of nodes on each
 # axis of the grids about one, and of these grids.
 STARTS, APART, FOLLOWING, ROUNDS = 12, 2.5, 5, 30
 # Least share of a limit of which the factor of a load that it allows is told.
 LEAST_SHARE = 1e-3
-# Growth of the box of the part on a side on which the part goes on, over its size.
-GROWTH = 0.25
+# Growth of the box of the part to each side, and on a side on which the part goes on, over its
+# size.
+AROUND, GROWTH = 0.1, 0.25
 # Digits of its values by which the function of a limit is that of another.
 SAME_DIGITS = 12
-# Factor of the number of nodes on an axis of the next grid, the largest number, and the change of
-# the volume, over the volume, after which there is none.
-FINER, FINEST, SETTLED = 1.6, 72, 3e-3
+# Factor of the number of nodes on an axis of the next grid, the largest number, and the difference
+# of the volume of the mesh from that of columns, over the latter, after which there is none.
+FINER, FINEST, SETTLED = 1.6, 72, 1.5e-3
+# Largest error of the volume, over the volume.
+VOLUME_ERROR = 1e-3
+# Names in a solid of the sides of a box, by its ends and axes.
+SIDES = {
+    (end, axis): f"side {end} of the box on axis {axis}" for end in (0, 1) for axis in range(3)
+}
 
 
 @dataclass(frozen=True)
@@ -58,17 +67,24 @@ class CarriedRegion:
     Attributes:
         volume: Exact volume of the workspace with the signs of home, in cubed design units.
         held_volume: Volume of the part, in cubed design units.
-        solid: The part.
+        error: Estimate of the largest error of that, a thousandth of it or less.
+        find_solid: Function that computes the solid.
         best: If the part is empty, the position found with the least share of a limit, shape (3,).
         factor: The factor of the load, the payload's weight and its force that this position
-            holds, 0 to 1; above 1 if the positions that hold them are too few for a solid.
+            holds, 0 to 1; above 1 if the positions that hold them are too few for a volume.
     """
 
     volume: float
     held_volume: float
-    solid: Solid
+    error: float
+    find_solid: Callable[[], Solid] = field(repr=False)
     best: FloatArray | None = None
     factor: float | None = None
+
+    @cached_property
+    def solid(self) -> Solid:
+        """The part as a mesh, computed when it is first asked for."""
+        return self.find_solid()
 
 
 def part_names(design: Design) -> tuple[str, ...]:
@@ -90,10 +106,8 @@ def carried_region(
 
     On a singular plane no unique forces hold a load, so that only positions with the signs of
     the margins count that the home pose has in its own orientation. The payload's weight and its
-    force of any direction act besides the load; the legs count as weightless. The volume is off by
-    about half a percent at most, that of a part below a thousandth of the workspace by a few
-    percent. Pieces apart from the others are missed if they contain no node of a grid of 20 nodes
-    on each axis of the workspace's extent and lie beyond the box about the others.
+    force of any direction act besides the load; the legs count as weightless. Pieces are missed
+    that lie between 65² columns along x, see `explorer.workspace.slices.columns`.
 
     Args:
         workspace: The workspace of a design with its payload and its limits.
@@ -110,18 +124,23 @@ def carried_region(
         return carried_region(
             Workspace(design.with_limits(margin=0.0), r), load, tolerance=tolerance
         )
-    exact, whole = volume_of(workspace), whole_solid(workspace, tolerance)
-    if whole.is_empty:
-        return CarriedRegion(exact.volume, 0.0, whole)
+    volume = volume_of(workspace).volume
     local = _LocalLoad(workspace, load_cases.load_case(design, r, w), part_names(design))
-    solid = _carried_part(whole, local)
-    if solid.is_empty:
+    found = volume_of_columns(workspace.region, VOLUME_ERROR, local.case, r)
+    if found.volume == 0.0:
+        whole = whole_solid(workspace, tolerance)
+        if whole.is_empty:
+            return CarriedRegion(volume, 0.0, 0.0, partial(whole_solid, workspace, tolerance))
         best = local.best_within(whole)
-        factor = 1.0 / max(best.share, LEAST_SHARE)
-        empty = replace(solid, empty_because=(local.part_names[best.part],))
-        return CarriedRegion(exact.volume, 0.0, empty, best.position, factor)
-    # The mesh of the whole lacks a share of the exact volume, and so does its part.
-    return CarriedRegion(exact.volume, solid.volume * exact.volume / whole.volume, solid)
+        if best.share <= 1.0:
+            near = best.position
+            found = volume_of_columns(workspace.region, VOLUME_ERROR, local.case, r, about=near)
+        if found.volume == 0.0:
+            factor = 1.0 / max(best.share, LEAST_SHARE)
+            empty = partial(_empty_part, local, tolerance, best.part)
+            return CarriedRegion(volume, 0.0, 0.0, empty, best.position, factor)
+    find_solid = partial(_carried_part, local, tolerance, found)
+    return CarriedRegion(volume, found.volume, found.error, find_solid)
 
 
 class Best(NamedTuple):
@@ -171,72 +190,51 @@ class _LocalLoad:
         return min(found, key=lambda best: best.share)
 
 
-def _carried_part(whole: Solid, load: _LocalLoad) -> Solid:
-    """Return the part of a workspace that holds a load.
+def _empty_part(load: _LocalLoad, tolerance: float | None, part: int) -> Solid:
+    """Return the empty part of a workspace, because of a part of the machine by its index."""
+    whole = whole_solid(load.workspace, tolerance)
+    none = replace(whole, vertices=whole.vertices[:0], faces=whole.faces[:0])
+    return replace(
+        none, limit_of_face=whole.limit_of_face[:0], empty_because=(load.part_names[part],)
+    )
 
-    It is carved out of a box about the nodes of a coarse grid that hold the load, which grows on
-    each side on which the part goes on beyond it. The grid within the box becomes finer until the
-    volume hardly changes. If no node holds the load, the best position within the limits counts;
-    the part is empty if that does not hold it either.
+
+def _carried_part(load: _LocalLoad, tolerance: float | None, found: ColumnVolume) -> Solid:
+    """Return the part of a workspace that holds a load, whose volume and box are known.
+
+    It is carved out of the box, which grows on each side on which the part goes on beyond it, by a
+    grid that becomes finer until the volume is the known one.
     """
-    grid = make_grid(*whole.ends, COARSE, 0)
-    positions = grid.positions.reshape(-1, 3)
-    kept = positions[(load.shares(positions)[0] <= 1.0) & load.workspace.contains(positions)]
-    if not len(kept):
-        best = load.best_within(whole)
-        if best.share > 1.0:
-            return replace(whole, vertices=kept, faces=whole.faces[:0])
-        kept = best.position[None]
-    around = AROUND * grid.step
-    box = np.array([kept.min(axis=0) - around, kept.max(axis=0) + around])
-    count, volume = math.ceil(NODES / FINER), -math.inf
+    whole = whole_solid(load.workspace, tolerance)
+    if whole.is_empty:
+        return whole
+    size = found.box[1] - found.box[0]
+    box, count = found.box + AROUND * np.array([-size, size]), NODES
     while True:
-        near, side_of_limit = _crop(whole, box)
-        if near.is_empty:
-            return _without_limits(near, set(side_of_limit))
-        part, step = _carve(near, load, count)
-        bounding = np.unique(part.limit_of_face).tolist()
-        open_sides = [side for limit, side in side_of_limit.items() if limit in bounding]
-        if open_sides:
-            growth = GROWTH * np.array([box[0] - box[1], box[1] - box[0]])
-            for side in open_sides:
-                box[side] += growth[side]
+        near, ends = whole, whole.ends
+        for (end, axis), name in SIDES.items():
+            sign, level = (-1.0, 1.0)[end], float(box[end, axis])
+            if sign * level < sign * ends[end][axis]:
+                near = cut_solid(near, HalfSpace(name, sign * np.eye(3)[axis], sign * level))
+        part = near if near.is_empty else _carve(near, load, count)
+        indices: list[int] = np.unique(part.limit_of_face).tolist()
+        bounding = {part.limits[index] for index in indices}
+        cut = [side for side, name in SIDES.items() if name in bounding]
+        growth = GROWTH * np.array([box[0] - box[1], box[1] - box[0]])
+        for side in cut:
+            box[side] += growth[side]
+        if cut:
             continue
-        before, volume = volume, part.volume
-        if 0.0 < abs(volume - before) <= SETTLED * volume or count >= FINEST:
-            return _without_limits(part, set(side_of_limit))
+        is_settled = abs(part.volume - found.volume) <= SETTLED * found.volume
+        if is_settled or part.is_empty or count >= FINEST:
+            kept = [k for k, name in enumerate(part.limits) if name not in SIDES.values()]
+            new = np.searchsorted(kept, part.limit_of_face)
+            return replace(part, limit_of_face=new, limits=tuple(part.limits[k] for k in kept))
         count = min(FINEST, math.ceil(FINER * count))
-        seen = np.vstack([part.vertices, kept])
-        box[0] = np.maximum(box[0], seen.min(axis=0) - step)
-        box[1] = np.minimum(box[1], seen.max(axis=0) + step)
 
 
-def _crop(whole: Solid, box: FloatArray) -> tuple[Solid, dict[int, tuple[int, int]]]:
-    """Return the part of a solid within a box, shape (2, 3), and what sides of it cut.
-
-    The end and the axis of each side are found by the index of its limit in the part.
-    """
-    part, sides = whole, dict[int, tuple[int, int]]()
-    ends = whole.ends
-    for axis, unit in enumerate(np.eye(3)):
-        for end, sign in enumerate((-1.0, 1.0)):
-            level = float(box[end, axis])
-            if sign * level < sign * ends[end][axis] and not part.is_empty:
-                sides[len(part.limits)] = end, axis
-                name = f"side {end} of the box on axis {axis}"
-                part = cut_solid(part, HalfSpace(name, sign * unit, sign * level))
-    return part, sides
-
-
-def _without_limits(solid: Solid, dropped: set[int]) -> Solid:
-    """Return a solid without some limits, given by their indices, on which no face lies."""
-    kept = [index for index in range(len(solid.limits)) if index not in dropped]
-    new = np.searchsorted(kept, solid.limit_of_face)
-    return replace(solid, limit_of_face=new, limits=tuple(solid.limits[index] for index in kept))
-
-
-def _carve(near: Solid, load: _LocalLoad, nodes: int) -> tuple[Solid, FloatArray]:
-    """Return the positions of a solid that hold a load, by a grid, and the step of that."""
+def _carve(near: Solid, load: _LocalLoad, nodes: int) -> Solid:
+    """Return the positions of a solid that hold a load, by a grid."""
     from scipy.ndimage import maximum_filter
 
     grid = make_grid(*near.ends, nodes, BEYOND)
@@ -273,7 +271,7 @@ def _carve(near: Solid, load: _LocalLoad, nodes: int) -> tuple[Solid, FloatArray
             yield Surface(values[index], grid.lows, grid.step, own, (name,))
             remaining = remaining & (maximum_filter(values[index], 3, mode="nearest") >= 0.0)
 
-    return carved_solid(near, surfaces()), grid.step
+    return carved_solid(near, surfaces())
 
 
 def positions_within(

@@ -572,7 +572,7 @@ def test_part_that_holds_the_load_is_drawn_and_measured(
     assert 0.1 < expected / drawing.volume < 0.9
     words = drawing_words(Frame(load_state(region="held")), feed)
     assert "hold the load" in words
-    assert f"{100.0 * drawing.part.volume / drawing.volume:.2f} %" in words
+    assert f"{round(100.0 * drawing.part.volume / drawing.volume, 2):g} %" in words
     assert "(3, 0, −40) N at the tool, (0, 0.2, 0) N m, 0.5 kg of payload" in words
     assert {shell.colour for shell in drawing.surface.shells} == {PLAIN, AT_LIMIT}
     for shell in drawing.surface.shells:

@@ -17,6 +17,8 @@ from explorer.statics.load_cases import largest_shares, limit_values, load_case,
 from explorer.statics.slopes import twist_slopes
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map, torsion_range
+from explorer.workspace.slices.columns import volume_of_columns
+from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
 ROTATION = OPTIMAL.home_pose.rotation
@@ -48,11 +50,19 @@ def regions() -> FloatArray:
     return np.concatenate([shares, parts.astype(np.float64), values.ravel(), settled.ravel()])
 
 
+def columns() -> FloatArray:
+    region = Workspace(FULL.with_limits(margin=0.0), ROTATION).region
+    case = load_case(FULL, ROTATION, np.zeros(6))
+    found = volume_of_columns(region, 0.5, case, ROTATION)
+    return np.array([found.volume, found.error, *found.box.ravel()])
+
+
 CASES: dict[str, Callable[[], FloatArray]] = {
     "tilts": tilts,
     "greatest tilts": lambda: greatest_tilts(OPTIMAL, positions()[:2], azimuths=5),
     "share": lambda: np.array([orientation_share(OPTIMAL, POSITION, 200).share]),
     "regions": regions,
+    "columns": columns,
     "forward": lambda: forward(OPTIMAL, joints()).position,
     "nearest": lambda: nearest_singular_poses(Configuration(OPTIMAL, positions(), ROTATION))[0],
     "forces": lambda: actuator_forces(OPTIMAL, positions(), ROTATION, np.arange(1.0, 7.0)),

@@ -252,7 +252,7 @@ def _over_the_workspace(
             (name, volume, volume * cubic, markup.percentage(volume / entire), remark)
             for name, volume, remark in (
                 ("whole workspace", entire, ""),
-                ("holds the payload", carried.held_volume, "of a mesh, to half a per cent"),
+                ("holds the payload", carried.held_volume, "of columns, to a thousandth"),
             )
         ]
         yield markup.table(("volume", "units³", "cm³", "share", ""), rows, "<>>><")

@@ -145,10 +145,10 @@ def _find_accessible(
 
 def _find_carried(selection: Selection, tolerance: float) -> tuple[Part, Solid] | Trouble:
     region = carried_region(selection.workspace, selection.load, tolerance=tolerance)
-    # Without a factor something holds the load, or the workspace is empty.
-    if region.factor is None:
+    if region.volume == 0.0 or not region.solid.is_empty:
         return Part(region.held_volume), region.solid
-    if region.factor >= 1.0:
+    # Without a factor columns find a volume.
+    if region.factor is None or region.factor >= 1.0:
         return Trouble("the positions that hold it are too few to be drawn")
     (limit,) = region.solid.empty_because
     percent = format_apart((100.0 * region.factor, 100.0), 3, format_number)[0]
