@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
-from explorer.app.scene.shapes import add_label, add_lines, add_translucent, sphere
+from explorer.app.scene.shapes import add_label, add_lines, add_translucent, sphere, write_label
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Update
@@ -22,7 +22,7 @@ class Ellipsoid:
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
         self._body = add_translucent(scene, f"{name}/body", sphere(), OPACITY, side="front")
         self._axes = add_lines(scene, f"{name}/axes", 3, FAR, 2.0)
-        self._label = add_label(scene, f"{name}/label", "1", visible=False)
+        self._label = add_label(scene, f"{name}/label", "1")
 
     def show(self, visible: bool) -> Iterator[Update]:
         """Yield the updates that show or hide it."""
@@ -44,7 +44,6 @@ class Ellipsoid:
         semi_axes = (axes * lengths).T
         ends = np.stack([centre - semi_axes, centre + semi_axes], axis=1)
         yield self._axes, "points", ends.astype(np.float32)
-        yield self._label, "text", words
         longest = semi_axes[int(lengths.argmax())]
         upward = longest if longest[2] >= 0.0 else -longest
-        yield self._label, "position", tuple((centre + upward).tolist())
+        yield from write_label(self._label, words, centre + upward)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterator
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import viser
@@ -51,10 +51,8 @@ def add_lines(
     count: int,
     colour: Rgb | None,
     thickness: float,
-    *,
-    visible: bool = False,
 ) -> viser.LineSegmentsHandle:
-    """Add line segments, a number of them, as a node with a name.
+    """Add hidden line segments, a number of them, as a node with a name.
 
     Without a colour each has its own. The thickness is in pixels.
     """
@@ -66,7 +64,7 @@ def add_lines(
         colours,
         thickness=thickness,
         thickness_units="screen",
-        visible=visible,
+        visible=False,
     )
 
 
@@ -79,9 +77,8 @@ def add_translucent(
     colour: Rgb = (0, 0, 0),
     side: Literal["front", "double"] = "double",
     is_flat: bool = False,
-    visible: bool = False,
 ) -> viser.MeshHandle:
-    """Add a translucent mesh, of an opacity from 0 to 1, as a node with a name.
+    """Add a hidden translucent mesh, of an opacity from 0 to 1, as a node with a name.
 
     It is flat if each face is shaded by itself; a side of its faces, or both, are drawn.
     """
@@ -92,8 +89,15 @@ def add_translucent(
         opacity=opacity,
         side=side,
         flat_shading=is_flat,
-        visible=visible,
+        visible=False,
     )
+
+
+def draw_mesh(handle: viser.MeshHandle, mesh: tuple[FloatArray, NDArray[Any]]) -> Iterator[Update]:
+    """Yield the updates that give a node a mesh."""
+    vertices, faces = mesh
+    yield handle, "vertices", vertices.astype(np.float32)
+    yield handle, "faces", faces.astype(np.uint32)
 
 
 class Instances:
@@ -182,12 +186,10 @@ class Boxes(Instances):
 class Patch:
     """A translucent quadrilateral with an outline."""
 
-    def __init__(
-        self, scene: viser.SceneApi, name: str, *, opacity: float, visible: bool = True
-    ) -> None:
+    def __init__(self, scene: viser.SceneApi, name: str, *, opacity: float) -> None:
         square = np.zeros((4, 3)), np.array([[0, 1, 2], [0, 2, 3]])
-        self._plane = add_translucent(scene, f"{name}/plane", square, opacity, visible=visible)
-        self._outline = add_lines(scene, f"{name}/hem", len(SIDES), None, 1.5, visible=visible)
+        self._plane = add_translucent(scene, f"{name}/plane", square, opacity)
+        self._outline = add_lines(scene, f"{name}/hem", len(SIDES), None, 1.5)
 
     def show(self, visible: bool) -> Iterator[Update]:
         """Yield the updates that show or hide the patch."""
@@ -348,15 +350,20 @@ def add_label(
     *,
     colour: Rgb | None = None,
     fades: bool = True,
-    visible: bool = True,
 ) -> viser.LabelHandle:
-    """Add a label; its `text`, `position` and `visible` are assigned like those of other nodes.
+    """Add a hidden label; the parent of its node is the frame of its position.
 
-    The parent of its node is the frame of its position. Without a colour it has that of the page's
+    Without a colour it has that of the page's
     text; it may be pale where a body hides its point.
     """
     height = label_height((0, 0, 0) if colour is None else colour)
-    return scene.add_label(name, text, font_scene_height=height, depth_test=fades, visible=visible)
+    return scene.add_label(name, text, font_scene_height=height, depth_test=fades, visible=False)
+
+
+def write_label(handle: viser.LabelHandle, text: str, place: FloatArray) -> Iterator[Update]:
+    """Yield the updates that give a label its text and its position (3,)."""
+    yield handle, "text", text
+    yield handle, "position", tuple(place.tolist())
 
 
 def label_height(colour: Rgb) -> float:

@@ -66,7 +66,7 @@ class ComparedScene(ScenePart):
             scene, f"{name}/workspace", NO_MESH, OPACITY, colour=colour, is_flat=True
         )
         self._lines = add_lines(scene, f"{name}/outline", 1, colour, 2.5)
-        self._label = add_label(scene, f"{name}/label", NAMES[column], colour=colour, visible=False)
+        self._label = add_label(scene, f"{name}/label", NAMES[column], colour=colour)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the design in this frame."""

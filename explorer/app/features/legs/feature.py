@@ -17,6 +17,7 @@ from explorer.app.scene.shapes import (
     add_label,
     add_lines,
     add_translucent,
+    write_label,
 )
 from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
@@ -264,7 +265,7 @@ class ClearanceScene(ScenePart):
     def __init__(self, services: Services) -> None:
         scene = services.scene
         self._line = add_lines(scene, "/clearance/line", 1, OUTLINE, 4.0)
-        self._label = add_label(scene, "/clearance/label", "0", visible=False)
+        self._label = add_label(scene, "/clearance/label", "0")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the closest pair of this frame."""
@@ -276,10 +277,10 @@ class ClearanceScene(ScenePart):
             pair = int(clearances.closest)
             ends = placed.scale * clearances.points[pair]
             yield self._line, "points", ends[None].astype(np.float32)
-            yield self._label, "position", tuple(ends.mean(axis=0).tolist())
             least = float(clearances.clearance[pair])
             clearance = state.unit.text(least, 3, size=state.design.reach)
-            yield self._label, "text", f"legs {pair_name(PAIRS[pair])}: {clearance}"
+            words = f"legs {pair_name(PAIRS[pair])}: {clearance}"
+            yield from write_label(self._label, words, ends.mean(axis=0))
 
 
 class SweptTetrahedra(ScenePart):

@@ -14,16 +14,10 @@ from explorer.statics.budget import SourceCosts, ToleranceBudget, source_costs, 
 
 @dataclass(frozen=True)
 class BudgetRequest:
-    """A request for a budget.
+    """A request for a budget over positions in the orientation of a pose, or at the pose itself.
 
-    Attributes:
-        design: The manipulator.
-        over: Kind of the positions.
-        pose: Pose with the orientation, and with the position if there is only one.
-        box: Box of positions, if they are those of a box.
-        wanted: Largest displacement of the tool, in mm; None for the costs alone.
-        wanted_turn: Largest turn of the tool, in degrees; None for any.
-        keep_actuators: Whether the errors of the actuators stay.
+    The tool's largest displacement that is wanted is in mm, None for the costs alone; its largest
+    turn in degrees, None for any.
     """
 
     design: Design
@@ -37,13 +31,7 @@ class BudgetRequest:
 
 @dataclass(frozen=True)
 class BudgetDrawing:
-    """A budget.
-
-    Attributes:
-        request: The request.
-        costs: Costs of the tolerances that were found, or else of those stated.
-        found: Tolerances that keep the wanted precision; None if none is wanted.
-    """
+    """A budget: the costs of the tolerances found, or else stated; None found if none is wanted."""
 
     request: BudgetRequest
     costs: SourceCosts

@@ -40,9 +40,7 @@ FITTING = 0.45
 class SetForce(Action):
     """Set the force at the tool, along the axes of the base, in newtons.
 
-    Attributes:
-        force: The force.
-        keeps_scale: Whether its arrow keeps its scale, as while it is dragged.
+    Its arrow keeps its scale while it is dragged.
     """
 
     force: Triple
@@ -66,21 +64,14 @@ class SetForce(Action):
 
 
 def round_force(force: FloatArray, size: float) -> Triple:
-    """Return a force with the decimals that a thousandth of a size has.
-
-    Args:
-        force: The force, shape (3,), in newtons.
-        size: The size, in newtons.
-    """
+    """Return a force (3,) with the decimals that a thousandth of a size has, both in newtons."""
     return triple(np.round(force, 3 - math.floor(math.log10(size))))
 
 
 def fitting_scale(force: float, scale: float) -> float:
-    """Return the force whose arrow is as long as the reach, with which a force can be seen.
+    """Return the force in newtons whose arrow is as long as the reach, so that a force can be seen.
 
-    Args:
-        force: Size of the force, in newtons.
-        scale: The present one, which stays while the arrow is neither short nor long.
+    The present scale stays while the arrow is neither short nor long.
     """
     if force < LEAST_FORCE or SHORTEST <= force / scale <= LONGEST:
         return scale

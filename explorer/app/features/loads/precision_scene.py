@@ -79,7 +79,7 @@ class DeflectedScene(ScenePart):
         )
         self._balls = shapes.Balls(scene, "/precision/balls", [shapes.linear_colour(DEFLECTED)] * 5)
         self._way = shapes.add_lines(scene, "/precision/way", 1, DEFLECTED, 2.5)
-        self._label = shapes.add_label(scene, "/precision/label", "0 mm", visible=False)
+        self._label = shapes.add_label(scene, "/precision/label", "0 mm")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the deflection of this frame."""
@@ -103,14 +103,13 @@ class DeflectedScene(ScenePart):
         vertices, faces = platform_plate(placed)
         plate = placed.points["b4"] + vertices @ placed.frame.snapshot.rotation.T
         plate = plate + times * placed.scale * _displacements(precision, placed, plate)
-        yield self._plate, "vertices", plate.astype(np.float32)
-        yield self._plate, "faces", faces.astype(np.uint32)
+        yield from shapes.draw_mesh(self._plate, (plate, faces))
         yield self._way, "points", np.stack([tool, moved[4]])[None].astype(np.float32)
         design, deflection = precision.loaded.design, precision.deflection
         total = format_number(design.unit_mm * math.hypot(*deflection[:3].tolist()), DIGITS)
         turn = format_number(math.degrees(math.hypot(*deflection[3:].tolist())), DIGITS)
-        yield self._label, "text", f"{total} mm, {turn}°, drawn × {format_number(times)}"
-        yield self._label, "position", tuple(moved[4].tolist())
+        words = f"{total} mm, {turn}°, drawn × {format_number(times)}"
+        yield from shapes.write_label(self._label, words, moved[4])
 
     def _draw_legs(
         self, placed: Placed, precision: ToolPrecision, tips: FloatArray, times: float
@@ -129,12 +128,9 @@ class DeflectedScene(ScenePart):
 
 
 def _displacements(precision: ToolPrecision, placed: Placed, points: FloatArray) -> FloatArray:
-    """Return the displacements of points fixed to the platform, in design units.
+    """Return the displacements (n, 3), in design units, of points (n, 3) of the platform.
 
-    Args:
-        precision: The deflection, as a displacement of the tool and a turn about it.
-        placed: The frame.
-        points: Points in scene units, shape (n, 3).
+    The points are in scene units.
     """
     arms = (points - tool_point(placed)) / placed.scale
     x, y, z = precision.deflection[3:].tolist()

@@ -68,7 +68,7 @@ class ForcesScene(ScenePart):
             for leg in (2, 3)
         ]
         self._labels = {
-            name: shapes.add_label(scene, f"/forces/label/{name}", name, visible=False)
+            name: shapes.add_label(scene, f"/forces/label/{name}", name)
             for name in ("load", "weight", *JOINTS, "strut 2", "strut 3")
         }
 
@@ -94,20 +94,19 @@ class ForcesScene(ScenePart):
         yield from self._sleeves.colour(
             [shapes.linear_colour(share_colour(shares[i])) for i in LENGTH_ROWS]
         )
-        for index, leg in enumerate((2, 3)):
+        for index in (0, 1):
             share = _larger(shares[6 + index], shares[10 + index])
-            yield from self._draw_bending(placed, loaded, index, leg, share)
+            yield from self._draw_bending(placed, loaded, index, share)
         middles = 0.5 * (feet + tips)
         places = (middles[0], feet[1], middles[1], feet[2], middles[2], middles[3])
         forces, spread = loaded.reactions.actuators, loaded.reactions.spread
         size = float(np.abs(forces).max())
         for index, joint in enumerate(JOINTS):
-            label = self._labels[joint]
             words = _newtons(drop_rounding(float(forces[index]), size), 3)
             if spread[index]:
                 words += f" ± {_newtons(float(spread[index]), 2)}"
-            yield label, "text", f"{joint} {words}{_share_suffix(shares[index])}"
-            yield label, "position", tuple(places[index].tolist())
+            words = f"{joint} {words}{_share_suffix(shares[index])}"
+            yield from shapes.write_label(self._labels[joint], words, places[index])
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the tip of the load's arrow."""
@@ -124,14 +123,13 @@ class ForcesScene(ScenePart):
         tool = tool_point(placed)
         tails[0], vectors[0] = tool, load_tip(placed) - tool
         force = math.hypot(*state.view.forces.force)
-        yield self._labels["load"], "text", _newtons(force, 3)
-        yield self._labels["load"], "position", tuple((tails[0] + vectors[0]).tolist())
+        yield from shapes.write_label(self._labels["load"], _newtons(force, 3), load_tip(placed))
         weight = weight_of(loaded)
         if weight > 0.0:
             tails[1] = placed.on_platform(state.design.payload.centre)
             vectors[1] = reaction_vectors(placed, weight * np.array([state.design.gravity]))[0]
-            yield self._labels["weight"], "text", f"weight {_newtons(weight, 3)}"
-            yield self._labels["weight"], "position", tuple((tails[1] + vectors[1]).tolist())
+            words, tip = f"weight {_newtons(weight, 3)}", tails[1] + vectors[1]
+            yield from shapes.write_label(self._labels["weight"], words, tip)
         if loaded.is_regular:
             feet, tips = placed.struts
             tails[2:6], tails[6:8] = tips, feet[1:3]
@@ -157,10 +155,10 @@ class ForcesScene(ScenePart):
         yield from self._heads.colour(linear)
 
     def _draw_bending(
-        self, placed: Placed, loaded: LoadedPose, index: int, leg: int, share: float | None
+        self, placed: Placed, loaded: LoadedPose, index: int, share: float | None
     ) -> Updates:
         """Yield the updates that draw the bending moment of strut 2 or 3 beside it."""
-        design = placed.frame.state.design
+        design, leg = placed.frame.state.design, index + 2
         foot, tip = (ends[leg - 1] for ends in placed.struts)
         # With what the payload's force of any direction adds.
         moment = float(loaded.reactions.bending[index] + loaded.reactions.spread[6 + index])
@@ -170,7 +168,6 @@ class ForcesScene(ScenePart):
         top = foot + np.array([towards * height, 0.0, 0.0])
         colour = share_colour(share)
         yield self._bending[index], "vertices", np.array([foot, tip, top], dtype=np.float32)
-        yield self._bending[index], "faces", np.array([[0, 1, 2]], dtype=np.uint32)
         yield self._bending[index], "color", colour
         # The moment falls from the carriage to nothing at the platform's joint.
         lines = np.empty((ORDINATES + 1, 2, 3), dtype=np.float32)
@@ -179,10 +176,9 @@ class ForcesScene(ScenePart):
         lines[-1] = top, tip
         yield self._ordinates[index], "points", lines
         yield self._ordinates[index], "colors", shapes.of_one_colour(colour, ORDINATES + 1)
-        label = self._labels[f"strut {leg}"]
         words = f"strut {leg} {format_number(moment * 1e-3 * design.unit_mm, 3)} N m"
-        yield label, "text", words + _share_suffix(share)
-        yield label, "position", tuple(top.tolist())
+        words += _share_suffix(share)
+        yield from shapes.write_label(self._labels[f"strut {leg}"], words, top)
 
 
 class LoadHandle(ScenePart):

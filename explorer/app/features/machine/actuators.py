@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import itemgetter
 from typing import Any, NamedTuple, cast
 
 import msgspec
@@ -50,14 +51,9 @@ class MachineControls(Controls):
         *,
         is_possible: Condition = lambda _: True,
     ) -> None:
-        """Add a switch for a value that is None while it is off.
+        """Add a switch for the value at a path, which is None while it is off.
 
-        Args:
-            label: Words beside it.
-            hint: Sentence on what it does.
-            path: Path of the value in the state.
-            first: Function that returns the value with which it begins.
-            is_possible: Condition in which there can be a value.
+        The value begins with the first one; the switch is disabled where none is possible.
         """
 
         def write(state: State, on: bool) -> Action:
@@ -76,16 +72,7 @@ class MachineControls(Controls):
         *,
         is_possible: Condition = lambda _: True,
     ) -> None:
-        """Add a switch for a limit, and a field for its value while it is on.
-
-        Args:
-            label: Words beside the switch.
-            hint: Sentence on what it does.
-            field: Words beside the field, and its hint.
-            path: Path of the limit in the state.
-            first: Function that returns the limit with which it begins.
-            is_possible: Condition in which there can be a limit.
-        """
+        """Add a switch for a limit, and a field (words, hint) for its value while it is on."""
         self.switch(label, hint, path, first, is_possible=is_possible)
         self.field(
             *field,
@@ -95,15 +82,9 @@ class MachineControls(Controls):
 
 
 class Quantity(NamedTuple):
-    """A number that each of the six actuators has.
+    """A number that each of the six actuators has, by its name in `Actuators`.
 
-    Attributes:
-        name: Field of `Actuators`.
-        word: What it is, in the words beside a field.
-        unit: Its unit.
-        meaning: Beginning of the sentence on it.
-        step: Step of its fields.
-        start: Number to begin with; None for those of the push.
+    The meaning begins the sentence on it; where there is no start, it begins with the push.
     """
 
     name: str
@@ -174,36 +155,47 @@ def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
     with gui.add_folder("Each of the six", expand_by_default=False):
         for quantity in (PUSH, PULL, CONTINUOUS, SPEED, ACCELERATION, ERROR, STIFF):
             for index, joint in enumerate(JOINTS):
-                _add_one(controls, quantity, index, joint)
+                _add_field(
+                    controls,
+                    quantity,
+                    f"{quantity.word} of {joint}",
+                    f"of the actuator of {joint}",
+                    itemgetter(index),
+                    lambda six, value, index=index: with_value(six, str(index), value),
+                )
 
 
 def _add_common(controls: MachineControls, quantity: Quantity) -> None:
-    label = f"{quantity.word.capitalize()} ({quantity.unit})"
     # The number that counts for all six.
     extreme, word = (max, "largest") if quantity is ERROR else (min, "least")
-    controls.field(
-        label,
-        f"{quantity.meaning}, the same for all six; of different ones the field shows the {word}.",
-        Bound(
-            lambda frame: extreme(quantity.first(frame.state)),
-            lambda _, value: Set(quantity.path, (value,) * 6, label, format_number(value, 6)),
-        ),
-        step=quantity.step,
-        visible=lambda state: quantity.given(state) is not None,
+    _add_field(
+        controls,
+        quantity,
+        quantity.word.capitalize(),
+        f"the same for all six; of different ones the field shows the {word}",
+        extreme,
+        lambda _, value: (value,) * 6,
     )
 
 
-def _add_one(controls: MachineControls, quantity: Quantity, index: int, joint: str) -> None:
-    label = f"{quantity.word} of {joint} ({quantity.unit})"
+def _add_field(
+    controls: MachineControls,
+    quantity: Quantity,
+    words: str,
+    which: str,
+    read: Callable[[Six], float],
+    changed: Callable[[Six, float], object],
+) -> None:
+    label = f"{words} ({quantity.unit})"
 
     def write(state: State, value: float) -> Action:
-        values = with_value(quantity.first(state), str(index), value)
-        return Set(quantity.path, values, label, format_number(value, 6))
+        six = changed(quantity.first(state), value)
+        return Set(quantity.path, six, label, format_number(value, 6))
 
     controls.field(
         label,
-        f"{quantity.meaning}, of the actuator of {joint}.",
-        Bound(lambda frame: quantity.first(frame.state)[index], write),
+        f"{quantity.meaning}, {which}.",
+        Bound(lambda frame: read(quantity.first(frame.state)), write),
         step=quantity.step,
         visible=lambda state: quantity.given(state) is not None,
     )

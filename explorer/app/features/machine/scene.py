@@ -35,7 +35,7 @@ class ToolScene(ScenePart):
         self._axes = shapes.Rods(
             scene, "/platform/tool/axes", list(map(shapes.linear_colour, AXIS_COLOURS))
         )
-        self._label = shapes.add_label(scene, "/platform/tool-label", "tool", visible=False)
+        self._label = shapes.add_label(scene, "/platform/tool-label", "tool")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the tool of this frame."""
@@ -68,9 +68,7 @@ class PayloadScene(ScenePart):
         self._ball = shapes.add_translucent(
             scene, "/platform/payload", shapes.sphere(), BALL_OPACITY, colour=BRASS, side="front"
         )
-        self._label = shapes.add_label(
-            scene, "/platform/payload-label", "1 kg", fades=False, visible=False
-        )
+        self._label = shapes.add_label(scene, "/platform/payload-label", "1 kg", fades=False)
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the payload of this frame."""
@@ -78,11 +76,11 @@ class PayloadScene(ScenePart):
         yield from show(visible, self._ball, self._label)
         if not visible:
             return
-        centre = tuple((placed.scale * np.array(payload.centre)).tolist())
-        yield self._ball, "position", centre
+        centre = placed.scale * np.array(payload.centre)
+        yield self._ball, "position", tuple(centre.tolist())
         yield self._ball, "scale", ball_radius(payload.mass_kg)
-        yield self._label, "position", centre
-        yield self._label, "text", f"{format_number(payload.mass_kg)} kg"
+        words = f"{format_number(payload.mass_kg)} kg"
+        yield from shapes.write_label(self._label, words, centre)
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the ends of the ball along the axes of the base."""

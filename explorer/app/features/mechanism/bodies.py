@@ -83,18 +83,11 @@ class Bodies(ScenePart):
         base = shapes.plate(feet, BASE_RADIUS, PLATE_TOP - PLATE_THICKNESS, PLATE_TOP)
         for handle, mesh in ((self._base, base), (self._platform, platform_plate(placed))):
             yield handle, "visible", view.bodies and placed.is_schematic
-            yield from draw_mesh(handle, mesh)
+            yield from shapes.draw_mesh(handle, mesh)
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of cubes about the joints."""
         return around(np.array(list(placed.points.values())))
-
-
-def draw_mesh(handle: viser.MeshHandle, mesh: shapes.Mesh) -> Updates:
-    """Yield the updates that give a node a mesh."""
-    vertices, faces = mesh
-    yield handle, "vertices", vertices.astype(np.float32)
-    yield handle, "faces", faces.astype(np.uint32)
 
 
 def platform_plate(placed: Placed) -> shapes.Mesh:
@@ -150,7 +143,6 @@ class Telescopes(shapes.Rods):
 
 
 def _colours_of_parts(alarms: list[bool]) -> list[Rgb]:
-    """Return the colours of the parts of actuators, some of which have that of an alarm."""
     tubes = [OUTLINE if alarm else colours.TUBE for alarm in alarms]
     rods = [OUTLINE if alarm else colours.ROD for alarm in alarms]
     return [*tubes, *rods, *[colours.JOINT] * (2 * len(alarms))]

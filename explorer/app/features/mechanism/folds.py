@@ -20,7 +20,13 @@ from explorer.app.inputs.bindings import item
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span, length_span
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import add_label, add_lines, add_translucent, of_one_colour
+from explorer.app.scene.shapes import (
+    add_label,
+    add_lines,
+    add_translucent,
+    of_one_colour,
+    write_label,
+)
 from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, SetFold
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -139,7 +145,7 @@ class Leaves(ScenePart):
         self._edges = _add_lines(scene, "/leaves/edges", LEAVES, 3, EDGE)
         self._arcs = _add_lines(scene, "/leaves/arcs", MARGIN_COLOURS, SEGMENTS + 2, ARC)
         self._labels = [
-            add_label(scene, f"/leaves/label/{index}", "", colour=colour, visible=False)
+            add_label(scene, f"/leaves/label/{index}", "", colour=colour)
             for index, colour in enumerate(MARGIN_COLOURS, start=1)
         ]
 
@@ -164,8 +170,8 @@ class Leaves(ScenePart):
             yield lines, "points", sides.reshape(-1, 2, 3).astype(np.float32)
         for index, label in enumerate(self._labels):
             name, fold = FOLDS[FIRST_FOLD + index], placed.frame.folds[FIRST_FOLD + index]
-            yield label, "text", f"{name} {format_decimals(fold, 0)}°"
-            yield label, "position", tuple(arcs[index, SEGMENTS // 2].tolist())
+            words = f"{name} {format_decimals(fold, 0)}°"
+            yield from write_label(label, words, arcs[index, SEGMENTS // 2])
 
 
 def _add_lines(

@@ -11,7 +11,6 @@ quiet: thinner and paler. A ring with a ball marks where an incidence holds.
 
 from __future__ import annotations
 
-import functools
 import itertools
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -111,17 +110,12 @@ def margin_hover(services: Services) -> HoveredRow:
 
 @dataclass(frozen=True)
 class Approach:
-    """How near one incidence is.
+    """How near one incidence is, by its level, see `explorer.measures.verdict`.
 
-    Attributes:
-        level: Its level, see `explorer.measures.verdict`.
-        presence: How much of it is shown: 0 where it is far, 1 at the warning value and below.
-        is_shown: Whether its tetrahedron and its gap are shown at all.
-        is_nearest: Whether its tetrahedron is the clear one, which is filled once it fades in: that
-            of the row that is pointed at, otherwise that of the verdict.
-        is_touching: Whether the incidence holds and its gap is closed; parallel lines leave one.
-        ends: Ends of its gap on the base flag and on the platform flag, in the scene, shape (2, 3);
-            None if they are too far away to be drawn.
+    Its presence is 0 where it is far, 1 at the warning value and below. The nearest is that of the
+    row that is pointed at, otherwise that of the verdict. It touches where it holds and its gap is
+    closed; parallel lines leave one. The ends of the gap (2, 3), on the base flag and on the
+    platform flag in the scene, are None if they are too far away to be drawn.
     """
 
     level: float
@@ -192,9 +186,7 @@ class Tetrahedra(ScenePart):
             for index, each in enumerate(STROKES, start=1)
         ]
         self._names = [
-            shapes.add_label(
-                scene, f"/tetrahedra/{index}/name", f"δ{index}", colour=colour, visible=False
-            )
+            shapes.add_label(scene, f"/tetrahedra/{index}/name", f"δ{index}", colour=colour)
             for index, colour in enumerate(colours.MARGIN_COLOURS, start=1)
         ]
 
@@ -242,11 +234,13 @@ class Gaps(ScenePart):
         scene, self._hovered = services.scene, services.get(margin_hover)
         self._dashes = shapes.add_lines(scene, "/gaps/dashes", 3 * DASHES, None, THICK)
         self._feet = shapes.Balls(scene, "/gaps/feet", [colours.WARNED] * len(FEET))
+        vertices, faces = shapes.sphere()
+        ring = shapes.torus(RING_RADIUS, RING_TUBE)
+        mark = shapes.join_meshes((CONTACT_RADIUS * vertices, faces), ring)
         contacts = [shapes.linear_colour(colours.SINGULAR)] * 3
-        self._contacts = shapes.Instances(scene, "/gaps/contacts", _contact_mark(), contacts)
+        self._contacts = shapes.Instances(scene, "/gaps/contacts", mark, contacts)
         self._labels = [
-            shapes.add_label(scene, f"/gaps/label/{index}", "", fades=False, visible=False)
-            for index in (1, 2, 3)
+            shapes.add_label(scene, f"/gaps/label/{index}", "", fades=False) for index in (1, 2, 3)
         ]
 
     def updates(self, placed: Placed) -> Updates:
@@ -262,8 +256,8 @@ class Gaps(ScenePart):
         for index, each in shown.items():
             corners = [placed.points[name] for name in TETRAHEDRA[index]]
             at = np.mean(corners if each.ends is None else each.ends, axis=0)
-            yield self._labels[index], "text", gap_text(placed, index, each)
-            yield self._labels[index], "position", tuple(at.tolist())
+            text = gap_text(placed, index, each)
+            yield from shapes.write_label(self._labels[index], text, at)
         if gaps:
             yield from self._draw_gaps(gaps, shown)
         if closed:
@@ -316,11 +310,3 @@ def gap_text(placed: Placed, index: int, approach: Approach) -> str:
     margin, gap = float(snapshot.margins[index]), snapshot.gaps.lengths[index]
     margin, gap = (format_fitted(unit.factor * each, reach, 4) for each in (margin, gap))
     return f"δ{index + 1} {margin} · {gap} {unit.name}"
-
-
-@functools.cache
-def _contact_mark() -> shapes.Mesh:
-    """Return a ring about the z-axis with a ball in its middle."""
-    vertices, faces = shapes.sphere()
-    ring = shapes.torus(RING_RADIUS, RING_TUBE)
-    return shapes.join_meshes((CONTACT_RADIUS * vertices, faces), ring)

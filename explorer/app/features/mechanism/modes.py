@@ -10,7 +10,15 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism import bodies
 from explorer.app.features.mechanism.incidences import HoveredRow
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
-from explorer.app.scene.shapes import GHOST, NO_MESH, add_label, add_lines, add_translucent
+from explorer.app.scene.shapes import (
+    GHOST,
+    NO_MESH,
+    add_label,
+    add_lines,
+    add_translucent,
+    draw_mesh,
+    write_label,
+)
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import SetMode
 from explorer.app.widgets.buttons import press_button
@@ -143,9 +151,7 @@ class Ghosts(ScenePart):
             for i in range(7)
         ]
         self._legs = add_lines(scene, "/ghosts/legs", 28, GHOST, 1.2)
-        self._names = [
-            add_label(scene, f"/ghosts/name/{i}", MODES[i], visible=False) for i in range(7)
-        ]
+        self._names = [add_label(scene, f"/ghosts/name/{i}", MODES[i]) for i in range(7)]
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ghosts of this frame."""
@@ -161,7 +167,7 @@ class Ghosts(ScenePart):
         positions = placed.scale * each.position[modes]
         wxyzs = quaternion_from_rotation(each.rotation[modes])
         for plate, position, wxyz in zip(self._plates, positions, wxyzs, strict=False):
-            yield from bodies.draw_mesh(plate, plate_mesh)
+            yield from draw_mesh(plate, plate_mesh)
             yield plate, "position", tuple(position.tolist())
             yield plate, "wxyz", tuple(wxyz.tolist())
         tips = ghost_points(placed, modes)
@@ -170,8 +176,7 @@ class Ghosts(ScenePart):
         lines[: 4 * len(modes)] = bodies.leg_lines(placed, tips)
         yield self._legs, "points", lines.astype(np.float32)
         for label, mode, tip in zip(self._names, modes, tips[:, 0], strict=False):
-            yield label, "text", MODES[mode]
-            yield label, "position", tuple(tip.tolist())
+            yield from write_label(label, MODES[mode], tip)
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of cubes about the joints of the ghosts."""

@@ -18,7 +18,7 @@ from explorer.app.inputs.bindings import item
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.scene.shapes import NO_MESH, add_translucent
+from explorer.app.scene.shapes import NO_MESH, add_translucent, draw_mesh
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -274,8 +274,7 @@ class OrientationScene(ScenePart):
         yield self._solid, "visible", has_solid
         if over is not None and has_solid:
             yield self._solid, "color", COLOURS[over.request.over]
-            yield self._solid, "vertices", (scale * over.solid.vertices).astype(np.float32)
-            yield self._solid, "faces", over.solid.faces.astype(np.uint32)
+            yield from draw_mesh(self._solid, (scale * over.solid.vertices, over.solid.faces))
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of the boxes about the nodes and about the solid of the range."""

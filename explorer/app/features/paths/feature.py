@@ -41,7 +41,7 @@ class PathScene(ScenePart):
     def __init__(self, services: Services) -> None:
         scene = services.scene
         self._line = add_lines(scene, "/path/line", 1, FAR, 2.5)
-        self._label = add_label(scene, "/path/label", "path", visible=False)
+        self._label = add_label(scene, "/path/label", "path")
         self._balls = Balls(scene, "/path/crossings", [SINGULAR] * MOST_CROSSINGS)
 
     def updates(self, placed: Placed) -> Updates:

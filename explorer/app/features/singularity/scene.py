@@ -10,9 +10,9 @@ import viser
 
 from explorer.app.features.feature import Services, show
 from explorer.app.features.mechanism import bodies
+from explorer.app.scene import shapes
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import GHOST, NO_MESH, add_label, add_lines, add_translucent, sphere
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
@@ -48,10 +48,10 @@ class PlatformGhost:
     """The platform in another pose than the present one, and its legs, below a node."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
-        self._plate = add_translucent(
-            scene, f"{name}/platform", NO_MESH, GHOST_OPACITY, colour=SINGULAR
+        self._plate = shapes.add_translucent(
+            scene, f"{name}/platform", shapes.NO_MESH, GHOST_OPACITY, colour=SINGULAR
         )
-        self._legs = add_lines(scene, f"{name}/legs", 4, GHOST, 1.5)
+        self._legs = shapes.add_lines(scene, f"{name}/legs", 4, shapes.GHOST, 1.5)
 
     def show(self, visible: bool) -> Updates:
         """Yield the updates that show or hide the ghost."""
@@ -59,7 +59,7 @@ class PlatformGhost:
 
     def draw(self, placed: Placed, pose: Pose) -> Updates:
         """Yield the updates that draw the ghost in a pose."""
-        yield from bodies.draw_mesh(self._plate, bodies.platform_plate(placed))
+        yield from shapes.draw_mesh(self._plate, bodies.platform_plate(placed))
         yield self._plate, "position", tuple((placed.scale * np.array(pose.position)).tolist())
         yield self._plate, "wxyz", pose.quaternion
         joints = bodies.platform_joints(placed, np.array([pose.position]), pose.rotation[None])
@@ -72,8 +72,8 @@ class NearestGhost(ScenePart):
     def __init__(self, services: Services) -> None:
         scene = services.scene
         self._ghost = PlatformGhost(scene, "/nearest")
-        self._displacements = add_lines(scene, "/nearest/ways", 4, SINGULAR, 3.0)
-        self._label = add_label(scene, "/nearest/label", "δ1 = 0", visible=False)
+        self._displacements = shapes.add_lines(scene, "/nearest/ways", 4, SINGULAR, 3.0)
+        self._label = shapes.add_label(scene, "/nearest/label", "δ1 = 0")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the singular pose of this frame."""
@@ -88,8 +88,8 @@ class NearestGhost(ScenePart):
         yield self._displacements, "points", np.stack([here, tips], axis=1).astype(np.float32)
         state = placed.frame.state
         motion = state.unit.text(nearest.distance, size=state.design.reach)
-        yield self._label, "text", f"δ{nearest.incidence} = 0: {motion} of motion"
-        yield self._label, "position", tuple(tips[0].tolist())
+        words = f"δ{nearest.incidence} = 0: {motion} of motion"
+        yield from shapes.write_label(self._label, words, tips[0])
 
 
 def chosen_ghost(placed: Placed) -> NearestSingularity | None:
@@ -131,14 +131,14 @@ class BallScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._ball = add_translucent(
-            scene, "/ball/ball", sphere(), BALL_OPACITY, colour=FAR, side="front"
+        self._ball = shapes.add_translucent(
+            scene, "/ball/ball", shapes.sphere(), BALL_OPACITY, colour=FAR, side="front"
         )
         self._touch = scene.add_mesh_simple(
-            "/ball/touch", *sphere(), color=SINGULAR, scale=TOUCH_RADIUS, visible=False
+            "/ball/touch", *shapes.sphere(), color=SINGULAR, scale=TOUCH_RADIUS, visible=False
         )
-        self._line = add_lines(scene, "/ball/radius", 1, SINGULAR, 2.5)
-        self._label = add_label(scene, "/ball/label", "δ1 = 0", visible=False)
+        self._line = shapes.add_lines(scene, "/ball/radius", 1, SINGULAR, 2.5)
+        self._label = shapes.add_label(scene, "/ball/label", "δ1 = 0")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ball of this frame."""
@@ -156,8 +156,8 @@ class BallScene(ScenePart):
         yield self._touch, "position", tuple(touch.tolist())
         yield self._line, "points", np.stack([centre, touch])[None].astype(np.float32)
         distance = frame.state.unit.text(ball.radius, size=frame.state.design.reach)
-        yield self._label, "text", f"δ{ball.incidence} = 0: {distance} away"
-        yield self._label, "position", tuple(touch.tolist())
+        words = f"δ{ball.incidence} = 0: {distance} away"
+        yield from shapes.write_label(self._label, words, touch)
 
 
 @dataclass(frozen=True)
@@ -197,8 +197,8 @@ class FreeMotion(ScenePart):
     def __init__(self, services: Services) -> None:
         scene, self._session = services.scene, services.session
         self._ghost = PlatformGhost(scene, "/freedom")
-        self._axis = add_lines(scene, "/freedom/axis", 1, SINGULAR, 3.0)
-        self._label = add_label(scene, "/freedom/label", "", visible=False)
+        self._axis = shapes.add_lines(scene, "/freedom/axis", 1, SINGULAR, 3.0)
+        self._label = shapes.add_label(scene, "/freedom/label", "")
         self._frame: Frame | None = None
         self._swing: _Swing | None = None
         services.buttons.on(SHOW, self._begin, values={"1", "2", "3"})
@@ -228,8 +228,8 @@ class FreeMotion(ScenePart):
         ends = [float(along.min()) - overhang, float(along.max()) + overhang]
         axis = foot + np.outer(ends, direction)
         yield self._axis, "points", axis[None].astype(np.float32)
-        yield self._label, "text", f"turns about {swing.turn.line_name}"
-        yield self._label, "position", tuple(axis[1].tolist())
+        words = f"turns about {swing.turn.line_name}"
+        yield from shapes.write_label(self._label, words, axis[1])
 
     def _swing_of(self, incidence: int) -> _Swing | None:
         """Return a swing that begins now in the last frame; None if the turn is not free there."""

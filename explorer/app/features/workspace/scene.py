@@ -66,7 +66,7 @@ class WorkspaceScene(ScenePart):
         )
         self._planes = [_SingularPlane(scene, index) for index in range(3)]
         self._broken = add_lines(scene, "/workspace/broken/lines", 1, OUTLINE, 4.0)
-        self._broken_label = add_label(scene, "/workspace/broken/label", "limit", visible=False)
+        self._broken_label = add_label(scene, "/workspace/broken/label", "limit")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the workspace of a frame."""
@@ -154,10 +154,8 @@ class _SingularPlane:
 
     def __init__(self, scene: viser.SceneApi, index: int) -> None:
         self._index = index
-        self._patch = Patch(scene, f"/singular/{index + 1}", opacity=PLANE_OPACITY, visible=False)
-        self._label = add_label(
-            scene, f"/singular/{index + 1}/label", f"δ{index + 1} = 0", visible=False
-        )
+        self._patch = Patch(scene, f"/singular/{index + 1}", opacity=PLANE_OPACITY)
+        self._label = add_label(scene, f"/singular/{index + 1}/label", f"δ{index + 1} = 0")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the plane of a frame."""
