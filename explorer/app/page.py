@@ -238,11 +238,9 @@ class Page:
         reset = Command(
             "View › Reset layout", "Put the panels where they were at first.", layout.reset
         )
-        for command in (
-            reset,
-            *(each.of(self.session) for one in self._features for each in one.commands),
-        ):
-            self.services.commands.add(command)
+        self.services.commands.add(reset)
+        for each in (command for feature in self._features for command in feature.commands):
+            self.services.commands.add(each.of(self.session))
         return Palette(self._server, self.services.commands.all)
 
     def _draw(self, frame: Frame) -> None:

@@ -23,7 +23,7 @@ from server_clock import wait_until_drawn
 
 import explorer.app
 from explorer.app.features.designs.feature import SavedDesigns
-from explorer.app.features.feature import Feature, Services, StateCommand, Tab
+from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.help.manual import list_entries
 from explorer.app.features.help.tour import EndTour
 from explorer.app.features.history.feature import OpenSession
@@ -53,6 +53,7 @@ from explorer.app.state.moves import SetAngle, SetJoint, SetPose, SetPosition, S
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.view import OrientationView
 from explorer.app.storage.user_data import open_user_data
+from explorer.app.widgets.chips import StateCommand
 from explorer.errors import ExplorerError
 from explorer.files.packaged import read_page
 from explorer.mechanism.design_file import PRESETS

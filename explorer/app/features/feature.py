@@ -21,7 +21,8 @@ from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.storage.user_data import Autosaver, UserData
-from explorer.app.widgets.buttons import Buttons, copy_button, press_button
+from explorer.app.widgets.buttons import Buttons, copy_button
+from explorer.app.widgets.chips import Chips, StateCommand
 from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import dim
 from explorer.app.widgets.theme import Theme
@@ -29,7 +30,7 @@ from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
 from explorer.jobs.jobs import Jobs
 from explorer.measures.blocks.source import Source
 from explorer.page.widgets.assigning import Updates
-from explorer.page.widgets.palette import Command, Commands, Key
+from explorer.page.widgets.palette import Command, Commands
 
 Place = Literal["build", "analyse", "work", "dialog"]
 Side = Literal["left", "middle", "right"]
@@ -137,36 +138,10 @@ class Services:
 
         self.buttons.on(name, press, values=values)
 
-    def link(
-        self,
-        name: str,
-        command: str,
-        hint: str,
-        change: Change,
-        *,
-        words: str = "",
-        is_ready: Callable[[State], bool] | None = None,
-    ) -> str:
-        """Add a button that changes the state, and its command; return it as HTML.
-
-        Args:
-            name: The name of the button, see `Buttons.on`.
-            command: The command, from the tab to what it does.
-            hint: Sentence on what it does.
-            change: Function from the state to the action; None for none.
-            words: The words on it; those of the command if "".
-            is_ready: Function that tells whether it can be pressed; if None, whenever there is an
-                action, which must be found at once.
-        """
-        self.do_on_press(name, lambda _: change)
-
-        def has_effect() -> bool:
-            state = self.session.state
-            return change(state) is not None if is_ready is None else is_ready(state)
-
-        self.buttons.offer(command, hint, name, is_ready=has_effect)
-        words = words or command.rpartition(" › ")[2]
-        return press_button(name, "", words, hint=hint, class_name="ex-link")
+    def link(self, name: str, command: StateCommand) -> str:
+        """Add a button that does a command, and offer it; return the button as HTML."""
+        Chips(self.buttons, self.session, name, "", {"": command})
+        return command.html(name, "", "ex-link")
 
     def copy_button(self, answer: str, source_of: Callable[[State], Source]) -> str:
         """Add the button that copies how an answer in a state is computed; return it as HTML."""
@@ -291,35 +266,6 @@ class Export:
     formats: tuple[str, ...]
     send: Callable[[Services, str, Who], None]
     is_ready: Callable[[Services], bool] = lambda _: True
-
-
-@dataclass(frozen=True)
-class StateCommand:
-    """A command that changes the state and has no control.
-
-    Attributes:
-        label: Name in the palette.
-        does: Sentence on what it does.
-        change: Function from the state to the action.
-        is_ready: Function that tells whether a state allows it.
-        keys: Keys that run it.
-    """
-
-    label: str
-    does: str
-    change: Callable[[State], Action]
-    is_ready: Callable[[State], bool] = lambda _: True
-    keys: tuple[Key, ...] = ()
-
-    def of(self, session: Session) -> Command:
-        """Return the command for a session."""
-
-        def run(client: viser.ClientHandle) -> None:
-            session.do(self.change, who=client.client_id)
-
-        return Command(
-            self.label, self.does, run, lambda: self.is_ready(session.state), keys=self.keys
-        )
 
 
 @dataclass(frozen=True)

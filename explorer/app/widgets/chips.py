@@ -1,6 +1,6 @@
-"""A row of small buttons in markup, bound to the state: switches, or options of which one is on.
+"""Commands that change the state, and rows of small buttons that do them.
 
-Each of them is a command of the palette too.
+A button in markup is a switch, an option of which one is on, or neither.
 """
 
 from __future__ import annotations
@@ -9,20 +9,89 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from html import escape
 
+import viser
+
 from explorer.app.session.session import Session
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import Buttons, press_button
-from explorer.page.widgets.palette import Key, with_keys
+from explorer.page.widgets.palette import STEP, Command, Key, with_keys
 
 
 @dataclass(frozen=True)
-class Effect:
-    """The effect of a chip: the action of a press, and whether the chip is on, by the state."""
+class StateCommand:
+    """A command of the palette that changes the state, and what a button that does it shows.
 
-    change: Callable[[State], Action]
-    is_on: Callable[[State], bool]
+    Attributes:
+        label: Name in the palette, from the tab to the option.
+        does: Sentence on what it does.
+        change: Function from the state to the action; None for none.
+        is_on: Function that tells whether a switch or an option is on; None if it is neither.
+        is_ready: Function that tells whether a state allows it; if None, whenever there is an
+            action, which must be found at once.
+        keys: Keys that run it, told in the hint of its button.
+        words: Words on its button; the last step of its label if "".
+        spoken: Name of its button for screen readers; the words if "".
+        is_visible: Function that tells whether its button stands in its row.
+    """
+
+    label: str
+    does: str
+    change: Callable[[State], Action | None]
+    is_on: Callable[[State], bool] | None = None
+    is_ready: Callable[[State], bool] | None = None
+    keys: tuple[Key, ...] = ()
+    words: str = ""
+    spoken: str = ""
+    is_visible: Callable[[State], bool] = lambda _: True
+
+    @property
+    def own_words(self) -> str:
+        """The words on its button."""
+        return self.words or self.label.rpartition(STEP)[2]
+
+    def can_run(self, state: State) -> bool:
+        """Whether a state allows it."""
+        return self.change(state) is not None if self.is_ready is None else self.is_ready(state)
+
+    def html(self, name: str, value: str, look: str, state: State | None = None) -> str:
+        """Return its button as HTML, as it is in a state; without one, as if always ready."""
+        return press_button(
+            name,
+            value,
+            escape(self.own_words),
+            hint=with_keys(self.does, self.keys),
+            label=self.spoken,
+            class_name=look,
+            is_on=None if state is None or self.is_on is None else self.is_on(state),
+            is_disabled=state is not None and not self.can_run(state),
+        )
+
+    def offer(self, buttons: Buttons, session: Session, name: str, value: str = "") -> None:
+        """Offer it as a press on a button of the page."""
+        buttons.offer(
+            self.label,
+            self.does,
+            name,
+            value,
+            lambda: self.can_run(session.state),
+            keys=self.keys,
+        )
+
+    def of(self, session: Session) -> Command:
+        """Return the command for a session."""
+
+        def run(client: viser.ClientHandle) -> None:
+            session.do(self.change, who=client.client_id)
+
+        return Command(
+            self.label, self.does, run, lambda: self.can_run(session.state), keys=self.keys
+        )
+
+
+Effect = tuple[Callable[[State], Action], Callable[[State], bool]]
+"""The action of a switch or an option, and whether it is on."""
 
 
 def turn(at: str, name: str) -> Effect:
@@ -30,53 +99,28 @@ def turn(at: str, name: str) -> Effect:
 
     The value is given by its path, such as "view.workspace.solid", and its name in the history.
     """
-    return Effect(
-        lambda state: Set(at, not value_at(state, at), name), lambda state: value_at(state, at)
-    )
+    return lambda state: Set(at, not value_at(state, at), name), lambda state: value_at(state, at)
 
 
-def choose(at: str, value: str, name: str) -> Effect:
-    """Return the effect of an option, which the history shows: a press sets a value of the state.
+def choose(at: str, value: str, name: str, words: str = "") -> Effect:
+    """Return the effect of an option: a press sets a value of the state.
 
-    The value is given by its path, such as "paths.kind", and its name in the history.
+    The value is given by its path, such as "paths.kind", its name and its words in the history,
+    which are the value itself if "".
     """
-    return Effect(lambda _: Set(at, value, name, value), lambda state: value_at(state, at) == value)
-
-
-@dataclass(frozen=True)
-class Chip:
-    """A small button bound to the state.
-
-    Attributes:
-        words: The words on it.
-        command: Its name in the palette, from the tab to the option.
-        hint: Sentence on what a press does.
-        effect: What a press changes, and whether the chip is on.
-        is_ready: Function that tells whether it can be pressed.
-        is_visible: Function that tells whether it stands in the row.
-        keys: Keys that press it, told in its hint.
-        label: Name for screen readers; the words if "".
-    """
-
-    words: str
-    command: str
-    hint: str
-    effect: Effect
-    is_ready: Callable[[State], bool] = lambda _: True
-    is_visible: Callable[[State], bool] = lambda _: True
-    keys: tuple[Key, ...] = ()
-    label: str = ""
+    action = Set(at, value, name, words or value)
+    return lambda _: action, lambda state: value_at(state, at) == value
 
 
 class Chips:
-    """A row of chips.
+    """A row of small buttons.
 
     Args:
-        buttons: Buttons of the page, among which the chips are registered.
+        buttons: Buttons of the page, among which the row is registered.
         session: Session to which they post.
         name: Name of the row among the buttons, such as "workspace.show".
-        title: Words before the row; "" for chips that stand in other markup.
-        chips: The chips by the values that their presses send.
+        title: Words before the row; "" for buttons that stand in other markup.
+        commands: The commands by the values that presses send.
     """
 
     def __init__(
@@ -85,27 +129,16 @@ class Chips:
         session: Session,
         name: str,
         title: str,
-        chips: Mapping[str, Chip],
+        commands: Mapping[str, StateCommand],
     ) -> None:
-        self._name = name
-        self._title = title
-        self._chips = chips
+        self._name, self._title, self._commands = name, title, commands
         buttons.on(
             name,
-            lambda value, client: session.do(chips[value].effect.change, who=client.client_id),
-            values=chips,
+            lambda value, client: session.do(commands[value].change, who=client.client_id),
+            values=commands,
         )
-        for value, chip in chips.items():
-            is_ready = chip.is_ready
-            buttons.offer(
-                chip.command,
-                chip.hint,
-                name,
-                value,
-                # A default binds the chip of this round.
-                lambda is_ready=is_ready: is_ready(session.state),
-                keys=chip.keys,
-            )
+        for value, each in commands.items():
+            each.offer(buttons, session, name, value)
 
     def html(self, state: State) -> str:
         """Return the row with its title as HTML."""
@@ -115,18 +148,9 @@ class Chips:
         )
 
     def buttons(self, state: State) -> str:
-        """Return the chips alone as HTML."""
+        """Return the buttons alone as HTML."""
         return "".join(
-            press_button(
-                self._name,
-                value,
-                escape(chip.words),
-                hint=with_keys(chip.hint, chip.keys),
-                label=chip.label,
-                class_name="ex-chip",
-                is_on=chip.effect.is_on(state),
-                is_disabled=not chip.is_ready(state),
-            )
-            for value, chip in self._chips.items()
-            if chip.is_visible(state)
+            each.html(self._name, value, "ex-chip", state)
+            for value, each in self._commands.items()
+            if each.is_visible(state)
         )

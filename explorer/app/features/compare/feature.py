@@ -23,7 +23,7 @@ from explorer.app.state.geometry import without_name
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.chips import Chip, Chips, Effect, choose, turn
+from explorer.app.widgets.chips import Chips, Effect, StateCommand, choose, turn
 from explorer.app.widgets.markup import box, swatch
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
@@ -76,19 +76,22 @@ class Unpin(Action):
         return with_value(state, f"compared.pinned.{self.slot}", None)
 
 
-def _has_pinned(state: State) -> bool:
-    return not Compared.of(state).is_empty
-
-
 def _look(
-    name: str,
-    hint: str,
+    label: str,
+    does: str,
     effect: Effect,
     words: str = "",
     is_visible: Callable[[State], bool] = lambda _: True,
-) -> Chip:
-    """Return the chip of a way to look at the comparison; its words are its name if ""."""
-    return Chip(words or name, f"Compare › {name}", hint, effect, _has_pinned, is_visible)
+) -> tuple[str, StateCommand]:
+    """Return a way to look at pinned designs as what a press sends, and its command."""
+    return label, StateCommand(
+        f"Compare › {label}",
+        does,
+        *effect,
+        lambda state: not Compared.of(state).is_empty,
+        words=words,
+        is_visible=is_visible,
+    )
 
 
 LOOKS = (
@@ -132,8 +135,7 @@ class ComparePanel:
         self._library = None if services.user_data is None else services.get(SavedDesigns)
         self.html = services.gui.add_html("")
         self._add_buttons(services)
-        looks = {chip.command.removeprefix("Compare › "): chip for chip in LOOKS}
-        self._looks = Chips(services.buttons, services.session, "compare.turn", "", looks)
+        self._looks = Chips(services.buttons, services.session, "compare.turn", "", dict(LOOKS))
         self._key: tuple[object, ...] = ()
         self._content = ""
 

@@ -25,6 +25,7 @@ from explorer.app.state.state import State
 from explorer.app.state.view import Weighed
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure
+from explorer.app.widgets.chips import StateCommand
 from explorer.app.widgets.markup import note
 from explorer.app.widgets.under_way import problem
 from explorer.measures.blocks import forces
@@ -83,10 +84,12 @@ class ForcesPanel:
             )
         self._assume = services.link(
             "forces.typical",
-            "Loads › Assume typical limits",
-            "Give actuators, struts and guide typical limits; the tab Machine shows and changes "
-            "them.",
-            assume_limits,
+            StateCommand(
+                "Loads › Assume typical limits",
+                "Give actuators, struts and guide typical limits; the tab Machine shows and "
+                "changes them.",
+                assume_limits,
+            ),
         )
         self._tables = gui.add_html("")
         self._most = gui.add_html("")
@@ -95,18 +98,22 @@ class ForcesPanel:
         )
         self._go = services.link(
             "forces.go",
-            "Loads › Go to the nearest position that holds",
-            "Move the platform to the nearest position that holds the load, turned as it is.",
-            self._go_to_nearest,
-            words="Go",
+            StateCommand(
+                "Loads › Go to the nearest position that holds",
+                "Move the platform to the nearest position that holds the load, turned as it is.",
+                self._go_to_nearest,
+                words="Go",
+            ),
         )
         self._turn = services.link(
             "forces.worst",
-            "Loads › Turn the force to its worst direction",
-            "Turn the force into the direction that uses the largest share of a limit here.",
-            self._turn_force,
-            words="Turn",
-            is_ready=lambda state: any(state.view.forces.force),
+            StateCommand(
+                "Loads › Turn the force to its worst direction",
+                "Turn the force into the direction that uses the largest share of a limit here.",
+                self._turn_force,
+                is_ready=lambda state: any(state.view.forces.force),
+                words="Turn",
+            ),
         )
 
     def updates(self, frame: Frame) -> Updates:

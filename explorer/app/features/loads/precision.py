@@ -17,6 +17,7 @@ from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.blocks import render
+from explorer.app.widgets.chips import StateCommand
 from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks import precision as answers
 from explorer.measures.box import PositionSet
@@ -132,19 +133,23 @@ class PrecisionPanel:
             self._result = gui.add_html("", visible=False)
         self._set = services.link(
             "precision.set",
-            "Loads › Set these tolerances",
-            "Give the design these tolerances, and these errors of its actuators.",
-            self._set_tolerances,
+            StateCommand(
+                "Loads › Set these tolerances",
+                "Give the design these tolerances, and these errors of its actuators.",
+                self._set_tolerances,
+            ),
         )
         self._copy = services.copy_button(
             "Loads › Precision", lambda state: self._loads.source("accuracy", state)
         )
         self._assume = services.link(
             "precision.typical",
-            "Loads › Assume typical errors and stiffness",
-            "Give the design typical errors, stiffness, struts and tolerances where it states "
-            "none; the tab Machine shows and changes them.",
-            assume_typical,
+            StateCommand(
+                "Loads › Assume typical errors and stiffness",
+                "Give the design typical errors, stiffness, struts and tolerances where it states "
+                "none; the tab Machine shows and changes them.",
+                assume_typical,
+            ),
         )
 
     def updates(self, frame: Frame) -> Updates:

@@ -13,7 +13,6 @@ from explorer.app.features.feature import (
     Feature,
     InBar,
     Services,
-    StateCommand,
     Tab,
     show_html,
 )
@@ -32,11 +31,10 @@ from explorer.app.state import actions, geometry, moves
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import open_geometry, preset_of, set_unit
 from explorer.app.state.moves import SetMode
-from explorer.app.state.parts import value_at
 from explorer.app.state.state import Hold, State
 from explorer.app.state.view import LengthName
 from explorer.app.widgets.buttons import figure
-from explorer.app.widgets.chips import Chip, Chips, Effect
+from explorer.app.widgets.chips import Chips, StateCommand, choose
 from explorer.app.widgets.markup import alert, box, note, remark
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.mechanism.design_file import PRESETS
@@ -186,16 +184,15 @@ def _choice(
     is_ready: Callable[[State, str], bool] = lambda _, __: True,
 ) -> Chips:
     """Return the options of the value at a path, with words and hint of each, in a titled row."""
-
-    def chip(value: str, words: str, hint: str) -> Chip:
-        effect = Effect(
-            lambda _: actions.Set(path, value, title, words),
-            lambda state: value_at(state, path) == value,
+    chips = {
+        value: StateCommand(
+            f"Pose › {title} › {words}",
+            hint,
+            *choose(path, value, title, words),
+            lambda state, value=value: is_ready(state, value),
         )
-        command = f"Pose › {title} › {words}"
-        return Chip(words, command, hint, effect, lambda state: is_ready(state, value))
-
-    chips = {value: chip(value, words, hint) for value, (words, hint) in options.items()}
+        for value, (words, hint) in options.items()
+    }
     return Chips(services.buttons, services.session, path, title, chips)
 
 

@@ -22,7 +22,7 @@ from explorer.app.scene.shapes import (
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import SetMode
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.chips import Chip, Chips, turn
+from explorer.app.widgets.chips import Chips, StateCommand, turn
 from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import quaternion_from_rotation
@@ -56,13 +56,13 @@ class ModesPanel:
         with gui.add_folder("8 modes", expand_by_default=False):
             self._table = gui.add_html("")
         services.do_on_press(GO, lambda mode: SetMode(int(mode)), set("01234567"))
-        ghosts = Chip(
-            "Ghosts",
+        ghosts = StateCommand(
             f"Pose › {GHOSTS_LABEL}",
             "Draw the seven other ways to assemble the same leg lengths.",
-            turn("view.ghosts", GHOSTS_LABEL),
+            *turn("view.ghosts", GHOSTS_LABEL),
             keys=(Key("M"),),
-            label=GHOSTS_LABEL,
+            words="Ghosts",
+            spoken=GHOSTS_LABEL,
         )
         self._ghosts = Chips(buttons, services.session, "modes.ghosts", "", {"": ghosts})
         for mode in range(len(MODES)):

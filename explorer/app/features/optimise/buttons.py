@@ -6,7 +6,7 @@ They stand in the markup of its tab, in the palette, and wherever else the page 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 
 import viser
@@ -17,11 +17,10 @@ from explorer.app.features.optimise import actions, work
 from explorer.app.features.optimise.state import Optimisation
 from explorer.app.features.workspace.feeds import send_workspace
 from explorer.app.session.session import Who
-from explorer.app.state.actions import Action
 from explorer.app.state.state import State
-from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.chips import StateCommand
 from explorer.optimise.outcome import encode_record
-from explorer.page.widgets.palette import Key, shift, with_keys
+from explorer.page.widgets.palette import Key, shift
 
 START, CANCEL = "optimise.start", "optimise.cancel"
 ACCEPT, REVERT = "optimise.accept", "optimise.revert"
@@ -29,24 +28,9 @@ PAPER, PAPER_BOX, LIFT = "optimise.paper", "optimise.box", "optimise.lift"
 HULL, DESIGN, RECORD = "optimise.hull", "optimise.design", "optimise.record"
 
 
-@dataclass(frozen=True)
-class Button:
-    """A button of the optimiser.
-
-    Attributes:
-        label: Words on the button, and its name in the palette.
-        hint: Sentence on what a press does.
-        is_ready: Function that tells whether it can be pressed.
-        action: Function that returns the action of a press from the state and the value of the
-            button; None where a press sends a file.
-        keys: Keys that do the same.
-    """
-
-    label: str
-    hint: str
-    is_ready: Callable[[State], bool]
-    action: Callable[[State, str], Action] | None = None
-    keys: tuple[Key, ...] = ()
+def _is_running(state: State) -> bool:
+    run = Optimisation.of(state).run
+    return run is not None and run.phase == "running"
 
 
 def _is_undecided(state: State) -> bool:
@@ -58,59 +42,70 @@ def _has_result(state: State) -> bool:
     return run is not None and run.best is not None
 
 
-BUTTONS: Mapping[str, Button] = {
-    START: Button(
-        "Optimise",
+BUTTONS: Mapping[str, StateCommand] = {
+    START: StateCommand(
+        "Optimise › Optimise",
         "Search for the best design from the present one; its limits hold throughout.",
-        lambda state: not (Optimisation.of(state).is_on or work.find_refusals(state)),
-        lambda _, __: actions.StartRun(),
-        (Key("O"),),
+        lambda _: actions.StartRun(),
+        is_ready=lambda state: not (Optimisation.of(state).is_on or work.find_refusals(state)),
+        keys=(Key("O"),),
     ),
-    CANCEL: Button(
-        "Cancel",
+    CANCEL: StateCommand(
+        "Optimise › Cancel",
         "End the search, and keep the best so far.",
-        lambda state: (run := Optimisation.of(state).run) is not None and run.phase == "running",
-        lambda _, __: actions.CancelRun(),
-        (shift("O"),),
+        lambda _: actions.CancelRun(),
+        is_ready=_is_running,
+        keys=(shift("O"),),
     ),
-    ACCEPT: Button("Accept", "Keep the new design.", _is_undecided, lambda _, __: actions.Accept()),
-    REVERT: Button(
-        "Revert",
+    ACCEPT: StateCommand(
+        "Optimise › Accept",
+        "Keep the new design.",
+        lambda _: actions.Accept(),
+        is_ready=_is_undecided,
+    ),
+    REVERT: StateCommand(
+        "Optimise › Revert",
         "Return to your own design in its pose.",
-        _is_undecided,
-        lambda _, __: actions.Revert(),
+        lambda _: actions.Revert(),
+        is_ready=_is_undecided,
     ),
-    PAPER: Button(
-        "The paper's problem",
+    PAPER: StateCommand(
+        "Optimise › The paper's problem",
         "Open the paper's initial design within the box of its optimum, and ask for its volume of "
         "8,000 cm³ with a clearance of 2 mm; one undo brings your design back.",
-        lambda state: not Optimisation.of(state).is_on,
-        lambda _, __: actions.TakePaperProblem(),
+        lambda _: actions.TakePaperProblem(),
+        is_ready=lambda state: not Optimisation.of(state).is_on,
     ),
-    PAPER_BOX: Button(
-        "Take the paper's box",
+    PAPER_BOX: StateCommand(
+        "Optimise › Take the paper's box",
         "Bound b4 by the box of the paper's optimum; one undo brings yours back.",
-        work.is_paper_box_on_offer,
-        lambda _, __: actions.TakePaperBox(),
+        lambda _: actions.TakePaperBox(),
+        is_ready=work.is_paper_box_on_offer,
     ),
-    LIFT: Button(
-        "Lift the limit",
+    LIFT: StateCommand(
+        "Optimise › Lift the limit",
         "Take the limit that prevents the search out of the design; one undo brings it back.",
-        lambda state: bool(work.liftable_limits(state)),
-        lambda state, limit: actions.LiftLimit(
-            limit or next(iter(work.liftable_limits(state)), "")
-        ),
+        lambda state: actions.LiftLimit(next(iter(work.liftable_limits(state)), "")),
+        is_ready=lambda state: bool(work.liftable_limits(state)),
     ),
-    HULL: Button(
-        "Download the hull",
+    # A press on one of these sends a file.
+    HULL: StateCommand(
+        "Optimise › Download the hull",
         "Download the convex hull of the workspace as 3MF; Export has other formats.",
-        _has_result,
+        lambda _: None,
+        is_ready=_has_result,
     ),
-    DESIGN: Button(
-        "Download the design", "Download the design as a file to open again.", _has_result
+    DESIGN: StateCommand(
+        "Optimise › Download the design",
+        "Download the design as a file to open again.",
+        lambda _: None,
+        is_ready=_has_result,
     ),
-    RECORD: Button(
-        "Download the record", "Download the record to repeat the search from.", _has_result
+    RECORD: StateCommand(
+        "Optimise › Download the record",
+        "Download the record to repeat the search from.",
+        lambda _: None,
+        is_ready=_has_result,
     ),
 }
 """The buttons by their names."""
@@ -118,10 +113,9 @@ BUTTONS: Mapping[str, Button] = {
 
 def add_buttons(services: Services) -> None:
     """Register the buttons of the optimiser, and offer them in the palette."""
-    session = services.session
 
     def send_record(who: Who) -> None:
-        state = session.state
+        state = services.session.state
         record = Optimisation.of(state).record
         if record is None:
             services.complain("a search that had to be ended leaves no record", who)
@@ -135,21 +129,16 @@ def add_buttons(services: Services) -> None:
     }
 
     def press(name: str, value: str, client: viser.ClientHandle) -> None:
-        action = BUTTONS[name].action
-        if action is None:
+        if name in sends:
             sends[name](client.client_id)
         else:
-            session.do(lambda state: action(state, value), who=client.client_id)
+            is_named = name == LIFT and value
+            change = actions.LiftLimit(value) if is_named else BUTTONS[name].change
+            services.session.do(change, who=client.client_id)
 
     for name, each in BUTTONS.items():
         services.buttons.on(name, partial(press, name))
-        services.buttons.offer(
-            f"Optimise › {each.label}",
-            each.hint,
-            name,
-            is_ready=lambda each=each: each.is_ready(session.state),
-            keys=each.keys,
-        )
+        each.offer(services.buttons, services.session, name)
 
 
 def button(
@@ -163,14 +152,8 @@ def button(
 ) -> str:
     """Return a button as HTML, disabled where it cannot be pressed.
 
-    Words and hint are those of the button if ""; its handler receives the value.
+    Words and hint are those of the command if ""; only that which lifts a limit has a value, the
+    name of the limit.
     """
-    declared = BUTTONS[name]
-    return press_button(
-        name,
-        value,
-        words or declared.label,
-        hint=with_keys(hint or declared.hint, declared.keys),
-        class_name="ex-button is-main" if is_main else "ex-button",
-        is_disabled=not declared.is_ready(state),
-    )
+    command = replace(BUTTONS[name], words=words, does=hint or BUTTONS[name].does)
+    return command.html(name, value, "ex-button is-main" if is_main else "ex-button", state)

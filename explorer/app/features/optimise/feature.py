@@ -326,7 +326,7 @@ def search_chip(frame: Frame) -> str:
         return activity(TAB, notice.title, notice.text, notice.share, buttons)
     if Optimisation.of(state).run is None and preset_of(state.design) is not None:
         paper, look = BUTTONS[PAPER], "ex-tool ex-outlined"
-        return open_button(TAB, paper.label, press=PAPER, hint=paper.hint, class_name=look)
+        return open_button(TAB, paper.own_words, press=PAPER, hint=paper.does, class_name=look)
     return ""
 
 

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab, show
+from explorer.app.features.feature import Feature, InBar, Runner, Services, Tab, show
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
@@ -17,6 +17,7 @@ from explorer.app.scene.shapes import Balls, add_label, add_lines
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import activity, press_button
+from explorer.app.widgets.chips import StateCommand
 from explorer.jobs.executor import LongJob
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import rotation_from_quaternion
@@ -159,8 +160,8 @@ PATHS = Feature(
             "Paths › Play or pause",
             "Play the present path, or pause it.",
             lambda state: Play(not is_playing(state)),
-            lambda state: journey_of(state) is not None,
-            (Key("P"),),
+            is_ready=lambda state: journey_of(state) is not None,
+            keys=(Key("P"),),
         ),
     ),
 )

@@ -20,7 +20,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import extra_button, press_button
-from explorer.app.widgets.chips import Chip, Chips, choose
+from explorer.app.widgets.chips import Chips, StateCommand, choose
 from explorer.errors import InputError
 from explorer.export.tables import trajectory_csv
 from explorer.files.extras import is_missing
@@ -77,7 +77,7 @@ class PathsPanel:
         gui, self._session = services.gui, services.session
         self._downloads, self._controls = services.downloads, Controls(services)
         kinds = {
-            kind: Chip(words, f"Paths › {words}", hint, choose("paths.kind", kind, "Path"))
+            kind: StateCommand(f"Paths › {words}", hint, *choose("paths.kind", kind, "Path"))
             for kind, (words, hint) in KINDS.items()
         }
         self._missing = extra_button("planning") if is_missing("planning") else ""
@@ -133,10 +133,11 @@ class PathsPanel:
         services.do_on_press("paths.cancel", lambda _: CANCEL)
         self._clear = services.link(
             "paths.clear",
-            "Paths › Clear",
-            "Remove the path and its line.",
-            lambda _: CLEAR,
-            is_ready=lambda state: journey_of(state) is not None,
+            StateCommand(
+                "Paths › Clear",
+                "Remove the path and its line.",
+                lambda state: None if journey_of(state) is None else CLEAR,
+            ),
         )
         buttons = services.buttons
         buttons.on("paths.export", self._export)

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, StateCommand, Tab, show_html
+from explorer.app.features.feature import Feature, InBar, Services, Tab, show_html
 from explorer.app.features.mechanism.incidences import HOVER, margin_hover
 from explorer.app.features.singularity import scene, work
 from explorer.app.inputs.bindings import At
@@ -22,6 +22,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.view import Gain, Ghost
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure, press_button
+from explorer.app.widgets.chips import StateCommand
 from explorer.app.widgets.markup import box, caption, dim, margin_name, meter, swatch, ticks
 from explorer.export.drawings.markup import as_html, circle, element
 from explorer.measures.blocks import singularity as blocks

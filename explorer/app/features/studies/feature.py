@@ -36,7 +36,7 @@ from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import Buttons, PressHandler, activity, press_button
-from explorer.app.widgets.chips import Chip, Chips, turn
+from explorer.app.widgets.chips import Chips, StateCommand, turn
 from explorer.app.widgets.downloads import File
 from explorer.app.widgets.markup import alert, beside
 from explorer.errors import ExplorerError
@@ -60,7 +60,7 @@ AXES: dict[Axis, tuple[str, str]] = {
 
 
 LOOKS = {
-    name: Chip(words, f"Studies › {words}", hint, turn(f"studies.{name}", words))
+    name: StateCommand(f"Studies › {words}", hint, *turn(f"studies.{name}", words))
     for name, words, hint in (
         ("logarithmic", "Logarithmic axes", "Draw axes of positive values on a logarithm."),
         ("front_only", "Only the front", "Draw only the designs on the Pareto front."),

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, StateCommand, Tab, show
+from explorer.app.features.feature import Feature, InBar, Services, Tab, show
 from explorer.app.features.mechanism import bodies
 from explorer.app.inputs.controls import Controls
 from explorer.app.scene.camera import VIEWS, ViewName
@@ -18,7 +18,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import DrawnAs
 from explorer.app.widgets.buttons import open_button, press_button
-from explorer.app.widgets.chips import Chip, Chips, Effect
+from explorer.app.widgets.chips import Chips, StateCommand
 from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
@@ -105,14 +105,19 @@ class OverlaysMenu:
 def _form_chips(services: Services) -> Chips:
     """Return the options of what the mechanism is drawn as; a press on one again goes back."""
 
-    def chip(form: DrawnAs, hint: str, keys: tuple[Key, ...]) -> Chip:
+    def chip(form: DrawnAs, hint: str, keys: tuple[Key, ...]) -> StateCommand:
         def is_on(state: State) -> bool:
             return state.view.drawn_as == form
 
-        effect = Effect(lambda state: draw_as("schematic" if is_on(state) else form), is_on)
         name = draw_as(form).text
-        command = f"{OVERLAYS} › Drawn as › {name}"
-        return Chip(name.capitalize(), command, hint, effect, keys=keys)
+        return StateCommand(
+            f"{OVERLAYS} › Drawn as › {name}",
+            hint,
+            lambda state: draw_as("schematic" if is_on(state) else form),
+            is_on,
+            keys=keys,
+            words=name.capitalize(),
+        )
 
     chips = {form: chip(form, *words) for form, words in FORMS.items()}
     return Chips(services.buttons, services.session, "view.form", "Drawn as", chips)

@@ -25,7 +25,7 @@ from explorer.app.state.moves import SetPose, StartThere
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.buttons import figure
-from explorer.app.widgets.chips import Chip, Chips, Effect, turn
+from explorer.app.widgets.chips import Chips, StateCommand, turn
 from explorer.app.widgets.markup import alert, box, note, sentence
 from explorer.app.widgets.under_way import UnderWay, look_of
 from explorer.measures.verdict import warnings
@@ -98,9 +98,11 @@ class WorkspacePanel:
         self._trouble = gui.add_html("", visible=False)
         self._start = services.link(
             "workspace.start",
-            "Workspace › Go there",
-            "Move the platform to that position and let the paths start from it.",
-            self._start_there,
+            StateCommand(
+                "Workspace › Go there",
+                "Move the platform to that position and let the paths start from it.",
+                self._start_there,
+            ),
         )
         controls.dropdown(
             "Orientation",
@@ -231,33 +233,37 @@ def _go_to(text: str) -> Change | None:
 
 def _part_chips(services: Services) -> Chips:
     """Return the switches of what is shown."""
-    chips: dict[str, Chip] = {}
-    for name, (words, hint, key) in SHOWN.items():
-        effect = turn(f"view.workspace.{name}", words)
-        chips[name] = Chip(words, f"Workspace › {words}", hint, effect, keys=(key,))
+    chips = {
+        name: StateCommand(
+            f"Workspace › {words}", hint, *turn(f"view.workspace.{name}", words), keys=(key,)
+        )
+        for name, (words, hint, key) in SHOWN.items()
+    }
     return Chips(services.buttons, services.session, "workspace.show", "Show", chips)
 
 
 def _cut_chips(services: Services) -> Chips:
     """Return the options of the cut, and the switch of the side that it keeps."""
 
-    def chip(words: str, axis: Axis | None) -> Chip:
+    def chip(words: str, axis: Axis | None) -> StateCommand:
         option, hint, key = "no cut", "Show the whole solid.", Key("C")
         if axis is not None:
             option, key = f"across {axis}", Key(axis.upper())
             hint = f"Cut the workspace open {option}, in its middle, and show the map of the slice."
-        effect = Effect(
+        return StateCommand(
+            f"Workspace › Cut open › {option}",
+            hint,
             lambda state: _set_cut(state.view.workspace, axis, option),
             lambda state: state.view.workspace.cut == axis,
+            keys=(key,),
+            words=words,
         )
-        return Chip(words, f"Workspace › Cut open › {option}", hint, effect, keys=(key,))
 
     chips = {words: chip(words, axis) for words, axis in CUTS.items()}
-    chips["flip"] = Chip(
-        "other side",
+    chips["flip"] = StateCommand(
         "Workspace › Cut open › other side",
         "Keep the other side of the cut.",
-        turn("view.workspace.flipped", "Other side of the cut"),
+        *turn("view.workspace.flipped", "Other side of the cut"),
         lambda state: state.view.workspace.cut is not None,
     )
     return Chips(services.buttons, services.session, "workspace.cut", "Cut", chips)
