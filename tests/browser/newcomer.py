@@ -147,11 +147,6 @@ class Newcomer:
         """Return the words of the buttons in sight that are filled."""
         return sorted(set(self.page.evaluate(FILLED)))
 
-    def wait_for_field(self, words: str, value: float) -> None:
-        """Wait until a field holds a number."""
-        field = self.field(words)
-        self._tab.wait_for(lambda: float(field.input_value()) == value, f"{words} at {value}")
-
     def wait_for_numbers(
         self, where: Locator, values: Sequence[float], tolerance: float = 0.006
     ) -> None:
