@@ -41,8 +41,7 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import sentence
 from explorer.app.widgets.theme import Theme
-from explorer.jobs.executor import log_error
-from explorer.jobs.jobs import PAGE, Jobs
+from explorer.jobs.jobs import PAGE, Jobs, log_error
 from explorer.measures.field_words import message_of
 from explorer.numerics.arrays import FloatArray
 from explorer.page.browser.browser_facts import listen

@@ -1,7 +1,7 @@
 """Processes that evaluate designs, as executors of `concurrent.futures`.
 
 The pool of the standard library, and that of loky, fails as a whole when one of its processes
-dies. Of a `ProcessExecutor` a death costs the one task that the process had.
+dies. Of `Jobs` a death costs the one task that the process had.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import ParamSpec, TypeVar
 
 from explorer.errors import ExplorerError, InputError
-from explorer.jobs.executor import LongJob, ProcessExecutor
-from explorer.jobs.process import Call
+from explorer.jobs.jobs import Jobs
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -59,8 +58,8 @@ class LocalWorkers(Workers):
         self._size = cores() if size is None else size
         if not 1 <= self._size <= MOST_WORKERS:
             raise InputError(f"the workers must be from 1 to {MOST_WORKERS}; got {self._size}")
-        self.processes = ProcessExecutor(
-            self._size, modules=MODULES, environment=dict.fromkeys(ONE_THREAD, "1")
+        self.jobs = Jobs(
+            size=self._size, modules=MODULES, environment=dict.fromkeys(ONE_THREAD, "1")
         )
         self._is_over = False
 
@@ -75,9 +74,7 @@ class LocalWorkers(Workers):
         """Call a function in one of the processes, see `concurrent.futures.Executor`."""
         if self._is_over:
             raise RuntimeError("no task can be submitted after the shutdown")
-        job = LongJob(Call(fn, args, kwargs, is_sending=False), died=DIED)
-        self.processes.start(job)
-        return job
+        return self.jobs.start(fn, args, options=kwargs, died=DIED)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes once all tasks are done, and wait for that, or let them end with this.
@@ -86,9 +83,9 @@ class LocalWorkers(Workers):
         """
         self._is_over = True
         if wait and not cancel_futures:
-            self.processes.wait_until_idle()
+            self.jobs.wait_until_idle(None)
         if wait or cancel_futures:
-            self.processes.stop()
+            self.jobs.stop()
 
 
 def cores() -> int:

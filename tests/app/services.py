@@ -15,8 +15,7 @@ from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.downloads import Downloads, File
 from explorer.errors import ExplorerError
-from explorer.jobs.executor import LongJob
-from explorer.jobs.jobs import PAGE, Jobs
+from explorer.jobs.jobs import Jobs, LongJob
 from explorer.jobs.process import Call
 from explorer.page.widgets.palette import Commands
 
@@ -59,19 +58,14 @@ class StubJobs(Jobs):
         self,
         task: Callable[..., Any],
         arguments: tuple[Any, ...],
-        done: Callable[[Any], None],
-        failed: Callable[[str], None],
+        done: Callable[[Any], None] = lambda _: None,
+        failed: Callable[[str], None] = lambda _: None,
         receive: Callable[[Any], None] | None = None,
-        *,
-        key: object = None,
-        process: str = PAGE,
-        died: str | None = None,
+        **more: Any,
     ) -> LongJob:
-        if process in self._real:
-            return super().start(
-                task, arguments, done, failed, receive, key=key, process=process, died=died
-            )
-        self.orders.append(StubOrder(key, task, arguments, done, failed))
+        if more.get("process") in self._real:
+            return super().start(task, arguments, done, failed, receive, **more)
+        self.orders.append(StubOrder(more.get("key"), task, arguments, done, failed))
 
         def execute() -> None:
             try:
@@ -85,7 +79,7 @@ class StubJobs(Jobs):
         self._waiting.append(execute)
         if self._at_once:
             self.work()
-        return LongJob(Call(task, arguments, {}, is_sending=False))
+        return LongJob(Call(task, arguments, {}, is_sending=False), receive, None)
 
     def work(self) -> None:
         """Execute the orders that wait."""

@@ -220,9 +220,7 @@ class Bench(Desk):
         self.do(Open(paper_start()), SetRequest("optimisation.request", request))
         self.push(START)
         self.wait(lambda s: Optimisation.of(s).is_on and len(run_of(s).iterates) >= iterates)
-        process = self.jobs.process_id(optimiser.SEARCH)
-        assert process is not None
-        return process
+        return self.jobs.process_ids(optimiser.SEARCH)[0]
 
     def wait_for_end(self) -> SearchRun:
         return run_of(self.wait(lambda state: not Optimisation.of(state).is_on))

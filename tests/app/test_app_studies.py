@@ -67,8 +67,7 @@ from explorer.app.state.state import open_state
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.files import extras
-from explorer.jobs.executor import LongJob
-from explorer.jobs.jobs import Jobs
+from explorer.jobs.jobs import Jobs, LongJob
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
@@ -723,8 +722,7 @@ def test_study_whose_process_dies_is_reported_and_keeps_the_rows_it_has(studio: 
     assert run is not None
     # Once there is something to keep.
     wait_for(is_under_way, PATIENCE)
-    number = studio.jobs.process_id("study")
-    assert number is not None
+    number = studio.jobs.process_ids("study")[0]
     os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
     studio.wait_until_idle()
     assert any("Continue the study" in each for each in desk.complaints)

@@ -17,8 +17,7 @@ import pytest
 from client import wait_for
 
 from explorer.app.server import ALLOCATOR, LOG, start_log
-from explorer.jobs.executor import DIED_TWICE, RESTARTED, LongJob, log_error
-from explorer.jobs.jobs import Jobs
+from explorer.jobs.jobs import DIED_TWICE, RESTARTED, Jobs, LongJob, log_error
 from explorer.jobs.process import CANCELLED
 from tests.app import telling
 
@@ -105,12 +104,12 @@ def test_task_sends_messages_while_it_runs_and_ends_when_it_is_cancelled(
     requester.request("count_until_cancelled")
     # The task ends for no other reason, so this came before its end.
     assert requester.next() == ("message", 0)
-    process = jobs.process_id()
+    process = jobs.process_ids()[0]
     requester.job.cancel(NEVER)
     messages, end = requester.all()
     assert end == ("done", len(messages) + 1)
     requester.assert_works()
-    assert jobs.process_id() == process
+    assert jobs.process_ids()[0] == process
     # One that ends by an exception says so.
     requester.request("end_when_cancelled")
     assert requester.next() == ("message", 0)
@@ -126,7 +125,7 @@ def test_next_task_is_neither_cancelled_nor_killed_with_the_last(
     requester.job.cancel(NEVER)
     first = requester.job
     requester.all()
-    process = jobs.process_id()
+    process = jobs.process_ids()[0]
     requester.request("count_until_cancelled")
     # The deadline of the first one passes now.
     first.cancel(AT_ONCE)
@@ -134,7 +133,7 @@ def test_next_task_is_neither_cancelled_nor_killed_with_the_last(
         assert requester.next() == ("message", number)
     requester.job.cancel(NEVER)
     assert requester.all()[1][0] == "done"
-    assert jobs.process_id() == process
+    assert jobs.process_ids()[0] == process
 
 
 def test_task_that_does_not_end_when_cancelled_is_killed_without_a_report(
@@ -142,12 +141,12 @@ def test_task_that_does_not_end_when_cancelled_is_killed_without_a_report(
 ) -> None:
     requester.request("hang")
     assert requester.next() == ("message", 0)
-    process = jobs.process_id()
+    process = jobs.process_ids()[0]
     requester.job.cancel(AT_ONCE)
     assert requester.next() == ("failed", CANCELLED)
     assert not reports
     requester.assert_works()
-    assert jobs.process_id() != process
+    assert jobs.process_ids()[0] != process
 
 
 def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
@@ -156,7 +155,7 @@ def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
     first, second, third, fourth = (Requester(jobs) for _ in range(4))
     first.request("count_until_cancelled")
     assert first.next() == ("message", 0)
-    process = jobs.process_id()
+    process = jobs.process_ids()[0]
     # Both wait for their turn.
     second.request("say", "still wanted", key="second", sends=False)
     third.request("say", "nobody asks any more", key="third", sends=False)
@@ -166,7 +165,7 @@ def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
     assert second.next() == ("done", "still wanted")
     assert fourth.next() == ("failed", CANCELLED)
     assert third.next() == ("failed", CANCELLED)
-    assert jobs.process_id() == process
+    assert jobs.process_ids()[0] == process
     assert not reports
 
 
@@ -175,7 +174,7 @@ def test_task_that_is_cancelled_after_some_time_makes_room_for_the_next(
 ) -> None:
     requester.request("count_until_cancelled")
     assert requester.next() == ("message", 0)
-    process = jobs.process_id()
+    process = jobs.process_ids()[0]
     first = requester.job
     requester.request("count", 3)
     first.cancel(after=0.05)
@@ -183,7 +182,7 @@ def test_task_that_is_cancelled_after_some_time_makes_room_for_the_next(
     # The first one ends for no other reason.
     assert end == ("done", len(messages) + 1)
     assert requester.all() == ([0, 1, 2], ("done", 3))
-    assert jobs.process_id() == process
+    assert jobs.process_ids()[0] == process
     assert not reports
 
 
@@ -212,9 +211,8 @@ def test_task_that_refuses_or_kills_its_process_is_reported(
 def test_request_of_a_key_replaces_the_one_that_waits(requester: Requester, jobs: Jobs) -> None:
     requester.request("say", "first", sends=False)
     assert requester.next() == ("done", "first")
-    process = jobs.process_id()
-    assert process not in (None, os.getpid())
-    assert process is not None
+    process = jobs.process_ids()[0]
+    assert process != os.getpid()
     # Stopped, so that it is at the first of them while the others are posted.
     os.kill(process, signal.SIGSTOP)
     for number in range(40):
@@ -237,22 +235,20 @@ def test_killed_worker_is_reported_and_started_again(
 ) -> None:
     requester.request("say", "first", sends=False)
     assert requester.next() == ("done", "first")
-    first = jobs.process_id()
-    assert first is not None
+    first = jobs.process_ids()[0]
     # Stopped, so that the kill hits it in the middle of its work, which is done all the same.
     os.kill(first, signal.SIGSTOP)
     requester.request("say", "again", sends=False)
     os.kill(first, signal.SIGKILL)
     assert requester.next() == ("done", "again")
-    second = jobs.process_id()
-    assert second not in (None, first)
-    assert second is not None
+    second = jobs.process_ids()[0]
+    assert second != first
     # And once more, while it has nothing to do.
     os.kill(second, signal.SIGKILL)
     requester.request("say", "once more", sends=False)
     assert requester.next() == ("done", "once more")
     assert reports == [RESTARTED] * 2
-    assert jobs.process_id() not in (None, first, second)
+    assert jobs.process_ids()[0] not in (first, second)
 
 
 def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
@@ -261,8 +257,7 @@ def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
     requester = Requester(jobs)
     requester.request("hang")
     assert requester.next() == ("message", 0)
-    process = jobs.process_id()
-    assert process is not None
+    process = jobs.process_ids()[0]
     os.kill(process, signal.SIGSTOP)
     jobs.stop()
     with pytest.raises(ProcessLookupError):
@@ -278,7 +273,7 @@ from tests.app import telling
 jobs = Jobs(print)
 def receive(value):
     if value == 5:
-        print(jobs.process_id(), flush=True)
+        print(jobs.process_ids()[0], flush=True)
         os._exit(0)
 jobs.start(telling.count_until_cancelled, (), print, print, receive)
 jobs.wait_until_idle(600.0)

@@ -82,7 +82,7 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     feed.follow(Frame(open_state(OPTIMAL)))
     assert jobs.wait_until_idle(PATIENCE)
     # A hidden drawing is not requested.
-    assert jobs.process_id() is None
+    assert jobs.process_ids() == []
     assert feed.drawing is None
     state = with_solid(open_state(OPTIMAL))
     for i in range(25):

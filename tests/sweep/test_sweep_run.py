@@ -30,7 +30,7 @@ from sweep_faults import DEADLY, HereWorkers, broken, deadly, foreign
 import explorer
 from explorer import InputError, workspace_volume
 from explorer.errors import MissingExtraError
-from explorer.jobs.executor import WorkerDiedError
+from explorer.jobs.jobs import WorkerDiedError
 from explorer.numerics.number_text import UNITS, Unit
 from explorer.sweep import run as runs
 from explorer.sweep.cluster import DaskWorkers
@@ -441,7 +441,7 @@ def test_workers_killed_at_their_start_are_started_again() -> None:
         found = workers.submit(os.getpid)
         killed: set[int] = set()
         while len(killed) < 6:
-            for process in workers.processes.process_ids:
+            for process in workers.jobs.process_ids():
                 with suppress(ProcessLookupError):
                     os.kill(process, signal.SIGKILL)
                 killed.add(process)

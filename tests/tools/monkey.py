@@ -41,7 +41,7 @@ from explorer.app.state.actions import Open
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
-from explorer.jobs.executor import RESTARTED
+from explorer.jobs.jobs import RESTARTED
 from explorer.mechanism.design_file import PRESETS, encode_design
 
 TABS = 3
@@ -367,13 +367,13 @@ class Monkey:
 
     def _kill(self) -> None:
         """Kill the worker that draws the workspace, whatever it is doing."""
-        number = self.running.page.jobs.process_id()
+        numbers = self.running.page.jobs.process_ids()
         # Twice over the same work it is given up; at rest it has none.
         is_time = self._in_turn or time.monotonic() - self._killed > KILL_SECONDS
-        if number is not None and is_time:
+        if numbers and is_time:
             self._killed = time.monotonic()
             with suppress(ProcessLookupError):
-                os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
+                os.kill(numbers[0], getattr(signal, "SIGKILL", signal.SIGTERM))
         self._did()
 
     def _preset(self) -> None:

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from explorer.app.state.frame import Frame
-from explorer.jobs.executor import LongJob
-from explorer.jobs.jobs import Jobs
+from explorer.jobs.jobs import Jobs, LongJob
 from explorer.jobs.process import CANCELLED, Channel
 from explorer.numerics.search import Watch, ignore_stage
 from explorer.page.session.clock import Pause, now

@@ -18,7 +18,7 @@ from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.jobs.executor import LongJob
+from explorer.jobs.jobs import LongJob
 from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import (
     OBJECTIVE_SYMBOLS,
@@ -158,7 +158,6 @@ class Optimiser(Runner):
                 compare_designs,
                 (run.problem, run.own.design, best.design),
                 lambda both: self._session.do(Compare(run.number, both)),
-                lambda _: None,
                 key=compare_designs,
                 process=SEARCH,
                 died=DIED,

@@ -18,7 +18,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import activity, press_button
 from explorer.app.widgets.chips import StateCommand
-from explorer.jobs.executor import LongJob
+from explorer.jobs.jobs import LongJob
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import rotation_from_quaternion
 from explorer.numerics.number_text import format_decimals, format_number

@@ -16,8 +16,7 @@ from explorer.app.features.studies.state import Studies, StudyPlan, study_around
 from explorer.app.session.session import Session, Who
 from explorer.errors import ExplorerError
 from explorer.files.extras import check_extra
-from explorer.jobs.executor import LongJob
-from explorer.jobs.jobs import Jobs
+from explorer.jobs.jobs import Jobs, LongJob
 from explorer.jobs.process import Channel
 from explorer.mechanism.design import Design
 from explorer.sweep.run import Progress, run_study
