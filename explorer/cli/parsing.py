@@ -39,7 +39,7 @@ def load_command(name: str, known: Iterable[str]) -> type[Any]:
         hint = suggestion(name, known) or f"there are {', '.join(known)}"
         raise UsageError(f"no command {name!r} ({hint}); see explorer --help")
     module = importlib.import_module(f"explorer.cli.commands.{_MODULES.get(name, name)}")
-    return getattr(module, name.capitalize())
+    return getattr(module, f"{name.capitalize()}Command")
 
 
 def parse(name: str, command: type[Any], argv: Sequence[str]) -> Any:

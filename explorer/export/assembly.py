@@ -61,7 +61,7 @@ def _3mf(prototype: Prototype) -> bytes:
     design, unit, home = prototype.design, prototype.design.unit_mm, prototype.design.home_pose
     places, kinds = prototype.chains.places_at(home.position, home.rotation), list(COLOURS)
     by_name = {part.name: part for part in prototype.parts}
-    model = mesh.Model(f"mechanism of {design.name}", design, COLOURS)
+    model = mesh.ThreeMfModel(f"mechanism of {design.name}", design, COLOURS)
     whole = model.add_group("mechanism")
     for name, members in part_groups():
         group = model.add_group(name)

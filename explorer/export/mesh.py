@@ -118,7 +118,7 @@ NAMESPACE = "urn:flagged-explorer"
 """The XML namespace of the design in a file's metadata."""
 
 
-class Model:
+class ThreeMfModel:
     """A model of lib3mf: a title, a design, and colours of materials by name, at least one."""
 
     def __init__(self, name: str, design: Design, colours: Mapping[str, Rgb]) -> None:
@@ -319,7 +319,7 @@ def _3mf(solid: Solid, design: Design, name: str) -> bytes:
     largest = float(np.abs(solid.vertices).max())
     decimals = min(16, max(4, 11 - math.floor(math.log10(largest))))
     points = _single(solid, "3mf", decimals).vertices
-    model = Model(name, design, {limit: colour_of(limit) for limit in solid.limits})
+    model = ThreeMfModel(name, design, {limit: colour_of(limit) for limit in solid.limits})
     mesh = model.add_mesh(name, points, solid.faces, 0)
     model.colour_faces(mesh, solid.limit_of_face)
     return model.encode(mesh, decimals)

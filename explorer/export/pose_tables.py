@@ -75,7 +75,7 @@ _UNKNOWN_UNIT = re.compile(
 _ANSWERED = ("line", "mode", "within_limits", "violations")
 
 
-class Column(NamedTuple):
+class PoseColumn(NamedTuple):
     """A column: its place among the cells of a line, its heading, and the factor of its unit.
 
     The factor leads to design units, degrees or seconds.
@@ -87,7 +87,7 @@ class Column(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Table:
+class PoseTable:
     """A table of text whose known columns are read as numbers.
 
     Attributes:
@@ -100,7 +100,7 @@ class Table:
 
     file: str
     headings: Sequence[str]
-    columns: Mapping[str, Column]
+    columns: Mapping[str, PoseColumn]
     rows: Sequence[tuple[int, list[str]]]
     decimal: str
 
@@ -161,7 +161,7 @@ def _example(name: str) -> str:
     return f"_{next(iter(_UNITS[name]))}" if _UNITS[name] else ""
 
 
-def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
+def parse_table(file: str, data: bytes, unit_mm: float) -> PoseTable:
     """Return the table in the contents of a CSV file.
 
     Args:
@@ -190,7 +190,7 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
             f"{file} needs a line of headings, such as x_mm, and 1 to {MOST_LINES} lines of "
             f"numbers below it; lines that are not blank: {len(rows)}"
         )
-    headings, columns = [cell.strip() for cell in rows[0][1]], dict[str, Column]()
+    headings, columns = [cell.strip() for cell in rows[0][1]], dict[str, PoseColumn]()
     for place, heading in enumerate(headings):
         match = _HEADING.fullmatch(heading.lower())
         if match is None or match[1] not in _UNITS:
@@ -202,7 +202,7 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
         factor = _factor(match, unit_mm)
         if factor is None:
             raise _wrong_unit(file, heading, match[1])
-        columns[match[1]] = Column(place, heading, factor)
+        columns[match[1]] = PoseColumn(place, heading, factor)
     width = len(headings)
     for line, cells in rows[1:]:
         if any(map(str.strip, cells[width:])):
@@ -213,7 +213,7 @@ def parse_table(file: str, data: bytes, unit_mm: float) -> Table:
         cells.extend([""] * (width - len(cells)))
     places = [column.place for column in columns.values()]
     has_comma = separator != "," and any("," in cells[k] for _, cells in rows[1:] for k in places)
-    return Table(file, headings, columns, rows[1:], "," if has_comma else ".")
+    return PoseTable(file, headings, columns, rows[1:], "," if has_comma else ".")
 
 
 def _wrong_unit(file: str, heading: str, name: str) -> InputError:
@@ -243,7 +243,7 @@ def _factor(match: re.Match[str], unit_mm: float) -> float | None:
 
 
 def read_poses(
-    table: Table, design: Design, rotation: FloatArray, at: Point = "b4"
+    table: PoseTable, design: Design, rotation: FloatArray, at: Point = "b4"
 ) -> Configuration:
     """Return the poses of a table; the rotation (3, 3) is theirs if it states no orientation.
 
@@ -268,7 +268,7 @@ def read_poses(
     return Configuration(design, position - offset_of(design, rotation, at), rotation)
 
 
-def read_joints(table: Table) -> FloatArray:
+def read_joints(table: PoseTable) -> FloatArray:
     """Return the joints (l1, d1, d2, d3, d4, l4) of a table, shape (n, 6), in design units.
 
     Raises:
@@ -302,14 +302,14 @@ class TableAnswer(NamedTuple):
     skipped: tuple[str, ...]
 
 
-def inverse_answer(table: Table, poses: Configuration, at: Point = "b4") -> TableAnswer:
+def inverse_answer(table: PoseTable, poses: Configuration, at: Point = "b4") -> TableAnswer:
     """Return the joints of the poses of a table, and which limits each violates."""
     rows, closes = np.arange(len(table.rows)), np.ones(len(table.rows), np.bool_)
     return _answer(table, (rows, mode_of(poses.margins)), poses, poses.joints, closes, at)
 
 
 def forward_answer(
-    table: Table, design: Design, joints: FloatArray, at: Point = "b4"
+    table: PoseTable, design: Design, joints: FloatArray, at: Point = "b4"
 ) -> TableAnswer:
     """Return the eight modes of the joints (n, 6) of a table, and which limits each violates.
 
@@ -322,7 +322,7 @@ def forward_answer(
 
 
 def _answer(
-    table: Table,
+    table: PoseTable,
     numbers: tuple[IntArray, IntArray],
     poses: Configuration,
     joints: FloatArray,

@@ -156,12 +156,12 @@ class Case:
     def accessible_volume(self) -> tuple[float, str]:
         """The volume that a collision-free move from home leads to; else NaN and the reason."""
         # Both load the kernel of solids.
-        from explorer.workspace.accessible.nodes import StartError
+        from explorer.workspace.accessible.nodes import InvalidStartError
         from explorer.workspace.accessible.workspace import accessible_part
 
         try:
             return accessible_part(self.workspace).accessible_volume, ""
-        except StartError as error:
+        except InvalidStartError as error:
             return math.nan, str(error)
 
     @cached_property

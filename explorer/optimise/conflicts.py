@@ -65,7 +65,7 @@ def paper_box(problem: problems.Problem) -> problems.Box | None:
 def without_limit(design: Design, limit: str) -> Design | None:
     """Return a design without one limit, its home where it was; None if it has no such limit.
 
-    The limit is named as in a conflict or a `StartError`. A maximum becomes the reach.
+    The limit is named as in a conflict or a `DesignStartError`. A maximum becomes the reach.
     """
     name = limit.partition(" ")[0]
     lengths = LENGTHS if limit == problems.MAXIMA else {name}.intersection(LENGTHS)

@@ -60,7 +60,7 @@ NO_LOAD, NO_ERRORS, RIGID = "no load", "no errors", "rigid"
 LEAST_REACH = 1e-3
 
 
-class StartError(InputError):
+class DesignStartError(InputError):
     """A design from which a problem cannot start.
 
     Attributes:
@@ -182,7 +182,7 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         msgspec.structs.force_setattr(self, "objective", objective)
         msgspec.structs.force_setattr(self, "variables", tuple(self.variables))
         if bounds_angles(self.start):
-            raise StartError(
+            raise DesignStartError(
                 "the volume has no gradient while joints bound the swing of legs: take these "
                 "bounds out of the design to optimise it",
                 SWING_LIMIT,
@@ -355,21 +355,23 @@ def _check_statics(problem: Problem) -> None:
     if demands.tilt is not None and not demands.tilt < MOST_TILT:
         raise InputError(f"the tilt demanded must be below {MOST_TILT:g}°; got {demands.tilt:g}°")
     if (needs_load or bends) and not (design.payload.mass_kg or design.payload.force_n):
-        raise StartError(
+        raise DesignStartError(
             "the design has no load: give its payload a mass, or a force of any direction", NO_LOAD
         )
     if moves and not design.payload.mass_kg:
-        raise StartError("the design has no mass to accelerate: give its payload a mass", NO_LOAD)
+        raise DesignStartError(
+            "the design has no mass to accelerate: give its payload a mass", NO_LOAD
+        )
     if (needs_load or moves) and np.isinf(part_limits(design)).all():
-        raise StartError(
+        raise DesignStartError(
             "the design limits neither its actuators nor its struts nor its guide: give a limit "
             "of forces or moments",
             NO_LOAD,
         )
     if needs_error and not any(design.actuators.error_mm):
-        raise StartError("the actuators of the design have no errors: give them", NO_ERRORS)
+        raise DesignStartError("the actuators of the design have no errors: give them", NO_ERRORS)
     if bends and not is_elastic(design):
-        raise StartError(
+        raise DesignStartError(
             "the design is rigid: give its actuators a stiffness, or its struts a diameter", RIGID
         )
 
@@ -382,7 +384,7 @@ def _check_objective(problem: Problem) -> None:
         raise InputError("largest-margin needs a required box to be margins over")
     is_tied = all(getattr(problem.start.limits, name)[1] is None for name in LENGTHS)
     if objective == "smallest-reach" and not (REACH in names or is_tied):
-        raise StartError(
+        raise DesignStartError(
             "the design fixes maximum lengths: tie them to the reach |a3|, or let the reach change "
             "as a variable of its own",
             MAXIMA,

@@ -41,7 +41,7 @@ Holds = Callable[[FloatArray, FloatArray], BoolArray]
 
 
 @dataclass(frozen=True)
-class Workspace:
+class RelativeVolume:
     """The volume over the cubed reach at the orientation of home, and its standard error."""
 
     name: str
@@ -67,7 +67,7 @@ class Abilities:
 def measure_workspaces() -> Measurement:
     """Compare the volume of the 4-4's workspace with those of six-legged mechanisms."""
     exact = workspace_volume(FREE).volume / OPTIMAL.reach**3
-    ours = Workspace("4-4", exact, 0.0)
+    ours = RelativeVolume("4-4", exact, 0.0)
     twins = [_workspace(each) for each in _twins()]
     octahedra = [_workspace(octahedral(OPTIMAL, size)) for size in SIZES]
     others = (*twins, *octahedra)
@@ -79,7 +79,7 @@ def measure_workspaces() -> Measurement:
     }
     values = {"mechanisms": [asdict(each) for each in (ours, *others)]}
 
-    def is_largest(among: Sequence[Workspace]) -> bool:
+    def is_largest(among: Sequence[RelativeVolume]) -> bool:
         return all(each.volume < (1.0 - ALIKE) * ours.volume for each in among)
 
     condition = "beside the 6-4; an octahedral platform has more or less by the size of its base"
@@ -146,7 +146,7 @@ def _points(seed: int) -> FloatArray:
     return qmc.Sobol(3, rng=np.random.default_rng([10, seed])).random_base2(POINTS_LOG2)
 
 
-def _workspace(mechanism: SixLegs) -> Workspace:
+def _workspace(mechanism: SixLegs) -> RelativeVolume:
     """Return the volume of a mechanism by several sets of points in a box about its workspace."""
     lows, highs = mechanism.box
     rotation = mechanism.home[1]
@@ -156,7 +156,7 @@ def _workspace(mechanism: SixLegs) -> Workspace:
         for seed in range(SETS)
     ]
     error = float(np.std(shares, ddof=1)) / SETS**0.5
-    return Workspace(mechanism.name, size * float(np.mean(shares)), size * error)
+    return RelativeVolume(mechanism.name, size * float(np.mean(shares)), size * error)
 
 
 def _abilities(name: str, holds: Holds, points: FloatArray, rotation: FloatArray) -> Abilities:

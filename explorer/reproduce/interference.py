@@ -48,7 +48,7 @@ Collides = Callable[[FloatArray, FloatArray], BoolArray]
 
 
 @dataclass(frozen=True)
-class Interference:
+class LegCollisions:
     """The clearances and collisions of the legs of a mechanism over a workspace.
 
     Attributes:
@@ -148,10 +148,10 @@ def measure_optimum() -> Measurement:
 
 def _interference(
     name: str, nodes: FloatArray, clearance: FloatArray, four: FloatArray, collides: Collides
-) -> Interference:
+) -> LegCollisions:
     """Measure a mechanism with a least clearance at each node, beside that of the 4-4, (n,)."""
     high = nodes[:, 2] >= FROM
-    return Interference(
+    return LegCollisions(
         name,
         tuple(float(clearance[nodes[:, 2] >= z].min()) for z in LOWEST),
         float(np.median(clearance[high])),
@@ -180,7 +180,7 @@ def _four_collides(start: FloatArray, end: FloatArray) -> BoolArray:
     return np.asarray(step_overlaps(*ends).any(axis=-1))
 
 
-def _table(mechanisms: Sequence[Interference]) -> list[str]:
+def _table(mechanisms: Sequence[LegCollisions]) -> list[str]:
     heads = "".join(f"{f'z ≥ {z:g}':>8}" for z in LOWEST)
     lines = [f"{'':18}{'least clearance':^24}", f"{'':18}{heads}{'median':>9}{'clearer':>9}"]
     for each in mechanisms:

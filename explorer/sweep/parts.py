@@ -36,7 +36,7 @@ class BadPartError(InputError):
 
 
 @dataclass(frozen=True)
-class Part:
+class PartMetadata:
     """Metadata of a part: encoded study, its hash, and the chunk."""
 
     study: bytes
@@ -110,7 +110,7 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
     write_whole(part_path(folder, chunk), data.getvalue())
 
 
-def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, Any]:
+def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[PartMetadata, Any]:
     """Return the metadata and the table of a part, with some of its columns or all.
 
     Raises:
@@ -126,12 +126,12 @@ def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, A
         raise BadPartError(one_line(f"{path} is no part of a study: {error}")) from None
 
 
-def _part_of(metadata: Mapping[bytes, bytes]) -> Part:
+def _part_of(metadata: Mapping[bytes, bytes]) -> PartMetadata:
     """Return the metadata of a part; a KeyError or a ValueError if they are damaged."""
     study, known_hash = metadata[_STUDY], metadata[_HASH].decode()
     if hashlib.sha256(study).hexdigest() != known_hash:
         raise ValueError("its metadata is damaged")
-    return Part(study, known_hash, int(metadata[_CHUNK]))
+    return PartMetadata(study, known_hash, int(metadata[_CHUNK]))
 
 
 def sound_parts(

@@ -93,7 +93,7 @@ def extreme_positions(workspace: Workspace, normals: FloatArray) -> FloatArray:
         for limit in (*limits, *(HalfSpace("", normal, 0.0) for normal in directions))
         if isinstance(limit, Cone) or float(limit.distance(middle)) <= unit * (1.0 + 1e-12)
     ]
-    surfaces = Surfaces.of([shift(limit, -middle) for limit in crossing], unit)
+    surfaces = Quadrics.of([shift(limit, -middle) for limit in crossing], unit)
     radii = [limit.radius for limit in crossing if isinstance(limit, BallOrCylinder)]
     directions = np.vstack([np.eye(3), directions])
 
@@ -113,7 +113,7 @@ def extreme_positions(workspace: Workspace, normals: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Surfaces:
+class Quadrics:
     """The surfaces of limits as those of `surface_of`, n of them.
 
     Attributes:
@@ -131,12 +131,12 @@ class Surfaces:
     level: FloatArray
 
     @staticmethod
-    def of(limits: Sequence[Constraint], unit: float) -> Surfaces:
+    def of(limits: Sequence[Constraint], unit: float) -> Quadrics:
         """Return the surfaces of limits, lengths divided by a unit."""
         rows = sorted((row for limit in limits for row in _rows(limit, unit)), key=itemgetter(0))
         kind, centre, steepness, axis, level = zip(*rows, strict=True)
         numbers = np.array(centre), np.array(steepness), np.array(axis), np.array(level)
-        return Surfaces(np.array(kind, dtype=np.int64), *numbers)
+        return Quadrics(np.array(kind, dtype=np.int64), *numbers)
 
     @cached_property
     def scale(self) -> FloatArray:
@@ -250,7 +250,7 @@ class Surfaces:
 
 
 def _rows(limit: Constraint, unit: float) -> Iterator[_Row]:
-    """Yield the surfaces of a limit as rows of `Surfaces`, lengths divided by a unit."""
+    """Yield the surfaces of a limit as rows of `Quadrics`, lengths divided by a unit."""
     if isinstance(limit, Never):
         return
     origin, scale, axis, steepness, level = surface_of(limit)

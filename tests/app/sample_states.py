@@ -11,10 +11,10 @@ import msgspec
 from hypothesis import strategies as st
 
 from explorer.app.features.compare.feature import Pin, Unpin
-from explorer.app.features.compare.state import Look
+from explorer.app.features.compare.state import CompareView
 from explorer.app.features.optimise.actions import (
     Accept,
-    Advance,
+    AddIterates,
     CancelRun,
     Compare,
     EndRun,
@@ -193,7 +193,7 @@ MAKERS: tuple[Make, ...] = (
     ),
     _request,
     lambda state, i, share: StartRun(),
-    lambda state, i, share: Advance(Optimisation.of(state).count, iterates_of(state, i)),
+    lambda state, i, share: AddIterates(Optimisation.of(state).count, iterates_of(state, i)),
     lambda state, i, share: CancelRun(),
     lambda state, i, share: _end(state, i),
     lambda state, i, share: Compare(Optimisation.of(state).count, (MEASURED, MEASURED)),
@@ -279,7 +279,7 @@ def rich_state() -> State:
         Change("paths", {"start": home, "goal": beyond, "kind": "planned", "holds_load": True}),
         Change("paths", {"drives": "duration", "duration": 0.5}),
         Pin(OPTIMAL),
-        Change("compared", {"look": varied(Look())}),
+        Change("compared", {"look": varied(CompareView())}),
         Set("studies", varied(Studies())),
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),

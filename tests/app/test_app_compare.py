@@ -18,10 +18,10 @@ from services import StubJobs, services_for
 
 from explorer.app.features.compare.feature import ComparePanel, Pin, Unpin
 from explorer.app.features.compare.scene import APART, SCENES
-from explorer.app.features.compare.state import Compared, Look
+from explorer.app.features.compare.state import Compared, CompareView
 from explorer.app.features.compare.table import (
     DRAWN,
-    Column,
+    ComparedDesign,
     bars,
     best_of,
     columns_of,
@@ -78,20 +78,20 @@ def measured(design: Design) -> Measurements:
     return measure_design(Case(design), LISTED)
 
 
-def compared(*pinned: Design, look: Look | None = None, live: Design = OPTIMAL) -> State:
+def compared(*pinned: Design, look: CompareView | None = None, live: Design = OPTIMAL) -> State:
     state = open_state(live)
     for design in pinned:
         state = Pin(design).apply(state)
-    return Set("compared.look", look or Look()).apply(state)
+    return Set("compared.look", look or CompareView()).apply(state)
 
 
 def columns(
     *pinned: Design, live: Design = OPTIMAL, millimetres: bool = False
-) -> tuple[Column, ...]:
+) -> tuple[ComparedDesign, ...]:
     """Return the columns of designs, all measured."""
     name, unit = ("mm", 1.0) if millimetres else ("units", live.unit_mm)
     return tuple(
-        Column(number, design, measured(design), Unit(name, design.unit_mm / unit))
+        ComparedDesign(number, design, measured(design), Unit(name, design.unit_mm / unit))
         for number, design in enumerate((live, *pinned))
     )
 
@@ -305,7 +305,7 @@ def test_change_of_the_live_design_requests_its_drawing_alone(
 ) -> None:
     follow(feeds, open_state(OPTIMAL))
     assert jobs.orders == []
-    state = compared(INITIAL, variant(2), look=Look(overlay=True))
+    state = compared(INITIAL, variant(2), look=CompareView(overlay=True))
     follow(feeds, state)
     designs = [without_name(each) for each in (OPTIMAL, INITIAL, variant(2))]
     assert [order.request.design for order in jobs.orders] == designs
@@ -343,7 +343,7 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     services: Services, feeds: list[CompareFeed], jobs: StubJobs
 ) -> None:
     large = msgspec.structs.replace(INITIAL, unit_mm=25.0)
-    state = compared(large, look=Look(overlay=True, outlines=True))
+    state = compared(large, look=CompareView(overlay=True, outlines=True))
     follow(feeds, state)
     scenes = [services.get(part) for part in SCENES]
     assigner = Assigner(services.server)
@@ -370,7 +370,7 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     close = 0.5 * APART * np.ptp(expected, axis=0).max()
     off = np.abs(np.asarray(mesh.vertices) - expected).max()
     assert 0.5 * close < off <= 1.001 * close
-    hidden = Frame(compared(large, look=Look()))
+    hidden = Frame(compared(large, look=CompareView()))
     follow(feeds, hidden.state)
     assigner.assign(update for scene in scenes for update in scene.updates(Placed(hidden)))
     assert not mesh.visible
@@ -399,7 +399,7 @@ def test_panel_pins_opens_unpins_and_switches(
     assert Compared.of(desk.state).pinned == (own, variant(7), None)
     desk.press(buttons, "compare.turn", "Overlay workspaces")
     desk.press(buttons, "compare.turn", "Bars")
-    assert Compared.of(desk.state).look == Look(shows="bars", overlay=True)
+    assert Compared.of(desk.state).look == CompareView(shows="bars", overlay=True)
     desk.press(buttons, "compare.unpin", "A")
     assert Compared.of(desk.state).pinned == (None, variant(7), None)
 

@@ -29,14 +29,14 @@ from explorer.app.features.help.tour import EndTour
 from explorer.app.features.history.feature import OpenSession
 from explorer.app.features.loads.load import WEIGHTS_FEED, SetForce
 from explorer.app.features.machine.feature import SetToolAngle
-from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
+from explorer.app.features.optimise.actions import AddIterates, Compare, EndRun
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
-from explorer.app.features.paths.actions import Advance as PlayOn, SetEnd, SetPathTime, TakePlan
+from explorer.app.features.paths.actions import AdvanceJourney, SetEnd, SetPathTime, TakePlan
 from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
 from explorer.app.features.workspace.words import CLAIM
-from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.bound import Control
 from explorer.app.inputs.controls import Controls
 from explorer.app.page import FEATURES, Page
@@ -123,7 +123,7 @@ def record_controls(patch: pytest.MonkeyPatch, controls: list[BoundControl]) -> 
     control_type: Any = Control
     bind, initialise = At.bound, control_type.__post_init__
 
-    def bind_and_record(at: At, name: str, options: Any = None) -> Bound[Any]:
+    def bind_and_record(at: At, name: str, options: Any = None) -> ControlBinding[Any]:
         bound = bind(at, name, options)
         sources[id(bound.write)] = at, options
         return bound
@@ -263,7 +263,7 @@ OF_VALUES = (
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map, a handle or a file gives."""
 
-OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan, EndTour)
+OF_NOBODY = (UserAction, MarkSaved, AddIterates, AdvanceJourney, EndRun, Compare, TakePlan, EndTour)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
 OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")} | {

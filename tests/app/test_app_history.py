@@ -19,7 +19,7 @@ from socket_tab import SocketTab
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
 from explorer.app.features.optimise.state import Optimisation, SearchResult
-from explorer.app.features.paths.actions import Advance, Go, Play, SetPathTime
+from explorer.app.features.paths.actions import AdvanceJourney, Go, Play, SetPathTime
 from explorer.app.features.paths.panel import CANCEL
 from explorer.app.features.paths.state import journey_of
 from explorer.app.features.singularity.work import GoToSingularity
@@ -62,7 +62,7 @@ actions = st.one_of(
     st.builds(Set, st.just("hold"), st.sampled_from(["pose", "legs"])),
     st.builds(Open, st.sampled_from([OPTIMAL, OTHER])),
     st.builds(GoToSingularity, st.sampled_from([None, 1, 2, 3])),
-    st.sampled_from([GoHome(), Reset(), Play(on=True), Play(on=False), Advance(0.5)]),
+    st.sampled_from([GoHome(), Reset(), Play(on=True), Play(on=False), AdvanceJourney(0.5)]),
     st.builds(Go),
     st.builds(SetPathTime, st.floats(0.0, 9.0)),
 )
@@ -190,7 +190,7 @@ def test_oldest_steps_are_dropped_and_the_others_keep_their_numbers(
 def test_playing_path_belongs_to_the_step_that_began_it(recorder: Recorder) -> None:
     recorder.do(Go())
     for _ in range(5):
-        recorder.do(Advance(0.3), "player", 1.0)
+        recorder.do(AdvanceJourney(0.3), "player", 1.0)
     assert len(recorder.words) == 1
     journey = journey_of(recorder.history.step.state)
     assert journey is not None

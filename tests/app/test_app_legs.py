@@ -18,7 +18,7 @@ from desk import Desk, by_name, number, random_states, rows_of as rows_below_hea
 from hypothesis import given, strategies as st
 from services import StubJobs, services_for
 
-from explorer.app.features.feature import Feed, Services
+from explorer.app.features.feature import FeedProtocol, Services
 from explorer.app.features.legs.feature import (
     RADIUS_FEED,
     ClearancePanel,
@@ -57,7 +57,7 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, TUBE
-from explorer.workspace.accessible.nodes import StartError, check_start
+from explorer.workspace.accessible.nodes import InvalidStartError, check_start
 from explorer.workspace.accessible.radii import RadiusCurve
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import slacks
@@ -67,7 +67,7 @@ pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
 RADIUS = 0.2
-Followed = TypeVar("Followed", bound=Feed)
+Followed = TypeVar("Followed", bound=FeedProtocol)
 # Rows of the rotation at home.
 LEVEL = work.rows_of(open_state(OPTIMAL).pose.rotation)
 
@@ -278,7 +278,7 @@ def test_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
     trouble = drawing.trouble
     assert drawing.part is None
     assert trouble is not None
-    with pytest.raises(StartError) as refused:
+    with pytest.raises(InvalidStartError) as refused:
         check_start(Workspace(state.design, state.pose.rotation), home)
     assert trouble.reason == refused.value.in_millimetres
     assert "l4 = 130.1 mm is above its maximum 125 mm" in trouble.reason

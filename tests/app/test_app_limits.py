@@ -24,7 +24,7 @@ from explorer.app.state.frame import Frame
 from explorer.numerics.number_text import UNITS
 from explorer.workspace.limits.constraints import angle_between
 from explorer.workspace.limits.quantities import ANGLE, Bound, Demand
-from explorer.workspace.limits.table import LIMITS, Entry, Limit, LimitCase, angle_from_home
+from explorer.workspace.limits.table import LIMITS, Limit, LimitCase, LimitSlider, angle_from_home
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import poses_are_valid
 from explorer.workspace.solids.solids import workspace_solid
@@ -51,7 +51,7 @@ LEAN = Limit(
     {"": "The lean of leg 4"},
     demands,
     (
-        Entry(
+        LimitSlider(
             NAME,
             "Maximum angle of leg 4 from its direction at home.",
             lambda _: (1.0, 180.0),

@@ -27,7 +27,7 @@ from explorer import Actuators, Payload, Struts
 from explorer.app.features.optimise import runner as optimiser
 from explorer.app.features.optimise.actions import (
     Accept,
-    Advance,
+    AddIterates,
     CancelRun,
     Compare,
     EndRun,
@@ -423,13 +423,13 @@ def test_platform_moves_freely_during_a_run_and_iterates_keep_its_position() -> 
     run = run_of(state)
     moved = SetPosition(0, 6.0).apply(state)
     last = iterates_of(state, 3)[-1]
-    after = Advance(run.number, (last,)).apply(moved)
+    after = AddIterates(run.number, (last,)).apply(moved)
     assert after.pose.position[0] == 6.0
     assert after.pose.quaternion == last.design.home_pose.quaternion
     assert after.pose.quaternion != run.own.design.home_pose.quaternion
     assert after.joints == open_state(last.design, after.pose).joints
     # Iterates of another run change nothing.
-    assert Advance(run.number + 1, (last,)).apply(moved) == moved
+    assert AddIterates(run.number + 1, (last,)).apply(moved) == moved
 
 
 def test_opening_another_design_forgets_the_run_and_keeps_the_request() -> None:
@@ -628,7 +628,7 @@ def test_charts_are_of_one_start_and_of_the_demands() -> None:
     iterates = iterates_of(state, 8)
     assert {each.run for each in iterates} == {0, 1}
     last = [each for each in iterates if each.run == 1]
-    drawn = charted_iterates(run_of(Advance(run.number, iterates).apply(state)))
+    drawn = charted_iterates(run_of(AddIterates(run.number, iterates).apply(state)))
     reach, volume, spare = curves_of(run.problem, drawn)
     assert reach.values.tolist() == [each.objective for each in last]
     assert volume.values.tolist() == [each.volume for each in last]

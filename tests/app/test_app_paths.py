@@ -22,7 +22,7 @@ from services import StubDownloads, StubJobs, services_for
 from explorer.app.features.feature import Services
 from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.features.paths.actions import (
-    Advance,
+    AdvanceJourney,
     Go,
     Play,
     SetPathTime,
@@ -44,8 +44,8 @@ from explorer.app.features.paths.panel import (
 )
 from explorer.app.features.paths.plots import (
     FOLDS,
+    ChartQuantity,
     LoadPlot,
-    Quantity,
     crossing_time,
     crossing_words,
     incidence_columns,
@@ -223,7 +223,7 @@ def test_path_is_of_its_design() -> None:
     for action in (SetPathTime(1.0), Play(True)):
         with pytest.raises(InputError, match="no path for this design"):
             action.apply(other)
-    assert Advance(1.0).apply(other) is other
+    assert AdvanceJourney(1.0).apply(other) is other
     assert journey_of(SetVariable("b2", OPTIMAL.b2).apply(other)) == path_of(state)
 
 
@@ -235,13 +235,13 @@ def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
     duration = path_of(state).trajectory.duration
     assert duration == pytest.approx(STRAIGHT_SECONDS)
     for _ in range(4):
-        state = Advance(0.3 * duration).apply(state)
+        state = AdvanceJourney(0.3 * duration).apply(state)
         assert state.pose == path_of(state).pose
     assert (path_of(state).at, path_of(state).is_playing) == (duration, False)
-    assert Advance(1.0).apply(state) is state
+    assert AdvanceJourney(1.0).apply(state) is state
     again = Play(True).apply(state)
     assert (path_of(again).at, path_of(again).is_playing) == (0.0, True)
-    paused = Play(False).apply(Advance(1.0).apply(again))
+    paused = Play(False).apply(AdvanceJourney(1.0).apply(again))
     assert (path_of(paused).at, path_of(paused).is_playing) == (1.0, False)
     assert path_of(SetPathTime(1e9).apply(paused)).at == duration
     assert path_of(SetPathTime(-1.0).apply(paused)).at == 0.0
@@ -258,7 +258,7 @@ def test_runner_plays_in_real_time_until_it_is_paused(bench: Bench) -> None:
     assert path_of(state).at <= time.monotonic() - began
     bench.do(Play(False))
     paused = bench.state
-    assert Advance(1.0).apply(paused) is paused
+    assert AdvanceJourney(1.0).apply(paused) is paused
     assert bench.times == sorted(bench.times)
 
 
@@ -280,7 +280,7 @@ def margins_of(pose: Pose) -> FloatArray:
 )
 @pytest.mark.parametrize(("first", "last"), [(0, 7), (1, 4), (1, 5)])
 def test_chart_shows_margins_or_folds_of_the_poses_over_time(
-    quantity: Quantity, value_of: Callable[[Pose], FloatArray], first: int, last: int
+    quantity: ChartQuantity, value_of: Callable[[Pose], FloatArray], first: int, last: int
 ) -> None:
     journey = path_of(SetPathTime(3.0).apply(start_between(first, last)))
     x, *curves, singular, now = incidence_columns(journey, quantity)

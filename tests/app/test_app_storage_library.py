@@ -13,7 +13,7 @@ import pytest
 from hypothesis import example, given, strategies as st
 from killed import run_until_killed
 
-from explorer.app.storage.library import Entry, Library, copy_name, file_of
+from explorer.app.storage.library import Library, LibraryFile, copy_name, file_of
 from explorer.errors import InputError, StorageError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
@@ -53,7 +53,7 @@ def copy_in(library: Library, file: str, name: str, number: int) -> Path:
     return path
 
 
-def problems(library: Library) -> list[Entry]:
+def problems(library: Library) -> list[LibraryFile]:
     return [each for each in library.list() if each.problem is not None]
 
 

@@ -19,7 +19,7 @@ from sample_states import OPTIMAL, Sample, rich_state, samples, states_of
 from explorer.app.features.optimise.actions import StartRun
 from explorer.app.features.optimise.state import Optimisation, SearchRun
 from explorer.app.features.paths.state import Paths
-from explorer.app.session.history import History, Step, start_history
+from explorer.app.session.history import History, HistoryStep, start_history
 from explorer.app.session.session import REDO, UNDO, Session
 from explorer.app.state.actions import SetName
 from explorer.app.state.moves import SetPosition
@@ -41,7 +41,7 @@ from explorer.page.storage.folder import data_folder
 
 DATA = Path(__file__).parents[1] / "data"
 RICH, OPENED = rich_state(), open_state(OPTIMAL)
-WHOLE = encode_session(History((Step(7, "Open", OPENED), Step(8, "All", RICH)), 1))
+WHOLE = encode_session(History((HistoryStep(7, "Open", OPENED), HistoryStep(8, "All", RICH)), 1))
 
 
 def saved_part_of(state: State) -> State:
@@ -62,7 +62,9 @@ def saved_run_of(run: SearchRun) -> SearchRun:
 
 
 def history_of(states: list[State], words: str = "Step {} «é»") -> History:
-    steps = (Step(number, words.format(number), state) for number, state in enumerate(states))
+    steps = (
+        HistoryStep(number, words.format(number), state) for number, state in enumerate(states)
+    )
     return History(tuple(steps), len(states) - 1)
 
 

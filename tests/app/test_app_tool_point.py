@@ -23,7 +23,7 @@ from workspace_feeds import draw
 
 from explorer.app.features.compare.feature import Pin
 from explorer.app.features.compare.scene import SCENES
-from explorer.app.features.compare.state import Look
+from explorer.app.features.compare.state import CompareView
 from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.feature import MovePanel
@@ -558,7 +558,9 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
     initial = with_tool(PRESETS["paper-initial"], (0.0, 2.0, 1.0))
     other = msgspec.structs.replace(initial, unit_mm=20.0)
     for at in ("b4", "tool"):
-        state = Set("compared.look", Look(overlay=True)).apply(Pin(other).apply(state_at(at)))
+        state = Set("compared.look", CompareView(overlay=True)).apply(
+            Pin(other).apply(state_at(at))
+        )
         for feed in FEEDS:
             services.get(feed).follow(Frame(state))
         assert isinstance(services.jobs, StubJobs)

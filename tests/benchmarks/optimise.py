@@ -19,7 +19,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import warm
 from explorer.optimise.defaults import CLEARANCE, PAPER_VOLUME, paper_problem, reach_problem
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.model import Evaluation, Model, reported_objective
+from explorer.optimise.search.model import Evaluation, SearchModel, reported_objective
 from explorer.optimise.search.starts import more_starts
 from explorer.optimise.solver import optimise_design
 from explorer.reproduce.optima import STARTS
@@ -65,7 +65,7 @@ class _Watched:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self.model = Model(problem, problem.start_values)
+        self.model = SearchModel(problem, problem.start_values)
         self.best = np.inf
         self.last: Evaluation = self.model.at(self.model.start)
 

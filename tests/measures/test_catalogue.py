@@ -21,7 +21,7 @@ from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.outcome import GOALS
 from explorer.optimise.problem import OBJECTIVES, OVER_BOX, YAW, ObjectiveName
-from explorer.optimise.search.model import Model, reported_objective
+from explorer.optimise.search.model import SearchModel, reported_objective
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.volume import workspace_volume
@@ -196,7 +196,7 @@ def test_objective_of_a_search_is_the_measure_that_it_is_named_after(
     middle = np.array(design.home_pose.position)
     box = (tuple((middle - 1e-3).tolist()), tuple((middle + 1e-3).tolist()))
     problem = make_problem(design, objective, volume=5.0, required_box=box, free=(YAW,))
-    model = Model(problem, problem.start_values)
+    model = SearchModel(problem, problem.start_values)
     state = model.at(model.start).state
     value = CATALOGUE[GOALS[objective]].function(Case(state.design, box=box))
     expected = abs(1.0 - value / 5.0) if objective == "match-volume" else value

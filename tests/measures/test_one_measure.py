@@ -10,7 +10,7 @@ import pytest
 from command_line import CommandLine
 from report_page import read
 
-from explorer.app.features.compare.table import Column, table
+from explorer.app.features.compare.table import ComparedDesign, table
 from explorer.app.features.compare.work import ComparedRequest, draw_compared
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.state import StudyPlan, label_of, study_around, title_of
@@ -129,7 +129,7 @@ def study() -> Study:
 
 def test_compare_lists_a_new_measure() -> None:
     measured = measure_design(Case(DESIGN), measures_in("compare"))
-    html = table([Column(0, DESIGN, measured, UNITS)])
+    html = table([ComparedDesign(0, DESIGN, measured, UNITS)])
     assert f"{NEW.label} " in html
     assert "units²" in html
     assert f"{AREA:.4f}" in html

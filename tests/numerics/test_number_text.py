@@ -12,7 +12,7 @@ from explorer.app.features.singularity.feature import distance_table, measures_t
 from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
-from explorer.cli.commands.kinematics import Singularity
+from explorer.cli.commands.kinematics import SingularityCommand
 from explorer.cli.output import degrees, figures
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
@@ -75,7 +75,7 @@ def test_page_and_command_at_a_singular_pose_show_no_rounding(
     start = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 10.0, 20.0))
     frame = Frame(GoToSingularity(incidence).apply(open_state(PRESETS["paper-optimal"], start)))
     pose = frame.state.pose
-    Singularity(position=pose.position, quaternion=pose.quaternion).run()
+    SingularityCommand(position=pose.position, quaternion=pose.quaternion).run()
     html = (summary(frame), distance_table(frame), measures_table(frame))
     for text in (*html, capsys.readouterr().out):
         plain = re.sub("<[^>]*>", " ", text)

@@ -28,7 +28,7 @@ from explorer.optimise.conflicts import (
 )
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import Problem, Variable, with_box
-from explorer.optimise.search.model import Model
+from explorer.optimise.search.model import SearchModel
 from explorer.optimise.search.sqp import MET
 from explorer.optimise.solver import optimise_design
 
@@ -97,7 +97,7 @@ def random_designs(rng: np.random.Generator, problem: Problem) -> list[tuple[flo
 
 def meets(problem: Problem, values: tuple[float, ...]) -> bool:
     """Whether a design meets all demands, by the optimiser's own measure of them."""
-    model = Model(problem, values)
+    model = SearchModel(problem, values)
     at = model.at(model.start)
     if np.abs(at.values[model.equalities]).max(initial=0.0) > MET:
         return False

@@ -54,7 +54,7 @@ from explorer.optimise.problem import (
     Variable,
     distances_of,
 )
-from explorer.optimise.search.model import Model
+from explorer.optimise.search.model import SearchModel
 from explorer.optimise.search.sqp import optimality
 from explorer.optimise.search.starts import more_starts
 from explorer.workspace.limits.constraints import slacks
@@ -156,9 +156,9 @@ def test_smallest_reach_for_the_paper_volume_is_optimal_and_below_17_90() -> Non
     assert outcome.converged
     assert outcome.design.reach <= 17.90
     assert workspace_volume(outcome.design).volume == pytest.approx(7053.044190625, rel=1e-8)
-    best = Model(outcome.problem, outcome.best.values)
+    best = SearchModel(outcome.problem, outcome.best.values)
     assert optimality(best, best.at(best.start)).is_optimal
-    start = Model(outcome.problem, outcome.problem.start_values)
+    start = SearchModel(outcome.problem, outcome.problem.start_values)
     assert optimality(start, start.at(start.start)).residual > 0.01
 
 
@@ -223,7 +223,7 @@ def test_designs_near_an_optimum_are_no_better(problem: Problem) -> None:
     outcome = optimise_design(problem)
     assert_is_sound(outcome)
     assert outcome.converged
-    model = Model(problem, outcome.best.values)
+    model = SearchModel(problem, outcome.best.values)
     best = model.at(model.start)
     lows, highs = model.bounds.T
     random = np.random.default_rng(0)

@@ -18,7 +18,7 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.optimise.problem import OBJECTIVES, OVER_BOX, ObjectiveName, Problem
-from explorer.optimise.search.model import Evaluation, Model
+from explorer.optimise.search.model import Evaluation, SearchModel
 
 # Places at which gradients are compared: one each day, twelve with all tests.
 POINTS = settings().max_examples // 25
@@ -91,7 +91,7 @@ def problems(name: str) -> Iterator[Problem]:
         )
 
 
-def points(model: Model, count: int, seed: int) -> Iterator[FloatArray]:
+def points(model: SearchModel, count: int, seed: int) -> Iterator[FloatArray]:
     """Yield random places around the start, none of them degenerate."""
     random = np.random.default_rng(seed)
     while count:
@@ -104,7 +104,7 @@ def points(model: Model, count: int, seed: int) -> Iterator[FloatArray]:
         count -= 1
 
 
-def around(model: Model, u: FloatArray) -> list[tuple[Evaluation, Evaluation]]:
+def around(model: SearchModel, u: FloatArray) -> list[tuple[Evaluation, Evaluation]]:
     """Return the evaluations one step ahead and behind of each variable."""
     return [(model.at(u + STEP * unit), model.at(u - STEP * unit)) for unit in np.eye(len(u))]
 
@@ -113,7 +113,7 @@ def around(model: Model, u: FloatArray) -> list[tuple[Evaluation, Evaluation]]:
 def test_gradients_of_demands_match_central_differences(name: str) -> None:
     warm()
     for seed, problem in enumerate(problems(name)):
-        model = Model(problem, problem.start_values)
+        model = SearchModel(problem, problem.start_values)
         kinds = {name.split(" ")[0] for name in model.names}
         assert kinds >= {
             "volume",
@@ -144,7 +144,7 @@ def test_slopes_of_objectives_match_central_differences(
         required_box=REQUIRED if objective in OVER_BOX else None,
         free=["yaw"],
     )
-    model = Model(problem, problem.start_values)
+    model = SearchModel(problem, problem.start_values)
     for u in points(model, POINTS, 5):
         slope = [(a.objective - b.objective) / (2.0 * STEP) for a, b in around(model, u)]
         assert_allclose(model.at(u).slope, slope, rtol=0, atol=TOLERANCE)
@@ -159,7 +159,7 @@ def test_required_box_demand_agrees_with_all_positions_of_the_box() -> None:
         half = random.uniform(0.5, 3.0, size=3)
         box = (tuple((middle - half).tolist()), tuple((middle + half).tolist()))
         problem = make_problem(design, "smallest-reach", volume=1.0, required_box=box)
-        model = Model(problem, problem.start_values)
+        model = SearchModel(problem, problem.start_values)
         at = model.at(model.start)
         boxed = np.array([name.startswith("required box") for name in model.names])
         shares = np.indices((13, 13, 13)).reshape(3, -1).T / 12.0

@@ -26,7 +26,7 @@ from playwright.sync_api import Browser, FloatRect, Page
 from server_clock import wait_until_drawn
 
 from explorer.app.features.compare.feature import Pin
-from explorer.app.features.compare.state import Look
+from explorer.app.features.compare.state import CompareView
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest
 from explorer.app.features.sharing.reporting import make_report
@@ -241,7 +241,7 @@ SCENES = {
             Pin(DESIGN),
             Pin(PRESETS["paper-initial"]),
             SetVariable("a3x", 17.0),
-            Set("compared.look", Look(overlay=True)),
+            Set("compared.look", CompareView(overlay=True)),
         ),
         panels=True,
         tab="Compare",

@@ -189,7 +189,7 @@ class Panel(Protocol):
         ...
 
 
-class Feed(Protocol):
+class FeedProtocol(Protocol):
     """Requests drawings from the process of the page, before the frame is drawn."""
 
     def follow(self, frame: Frame) -> None:
@@ -250,7 +250,7 @@ class InBar:
 
 
 @dataclass(frozen=True)
-class Export:
+class FileExport:
     """Files of one thing in several formats, as the dialog Export offers them.
 
     Attributes:
@@ -301,11 +301,11 @@ class Feature:
     manual: str = ""
     tabs: tuple[Tab, ...] = ()
     bar: tuple[InBar, ...] = ()
-    exports: tuple[Export, ...] = ()
+    exports: tuple[FileExport, ...] = ()
     openers: Mapping[str, Opener] = field(default_factory=dict[str, Opener])
     scene: tuple[Callable[[Services], ScenePart], ...] = ()
-    feeds: tuple[Callable[[Services], Feed], ...] = ()
-    later_feeds: tuple[Callable[[Services], Feed], ...] = ()
+    feeds: tuple[Callable[[Services], FeedProtocol], ...] = ()
+    later_feeds: tuple[Callable[[Services], FeedProtocol], ...] = ()
     runners: tuple[Callable[[Services], Runner], ...] = ()
     commands: tuple[StateCommand, ...] = ()
     passing: Callable[[Services], tuple[Command, ...]] | None = None

@@ -18,7 +18,7 @@ Value = TypeVar("Value", float, bool, str, Pair, Triple)
 
 
 @dataclass(frozen=True)
-class Bound(Generic[Value]):
+class ControlBinding(Generic[Value]):
     """The binding of a control: how its value is read in a frame, and written as an action.
 
     The action is None while the value does not change the state.
@@ -30,9 +30,9 @@ class Bound(Generic[Value]):
 
 def item(
     values: Callable[[Frame], Sequence[float]], index: int, action: Callable[[int, float], Action]
-) -> Bound[float]:
+) -> ControlBinding[float]:
     """Return the binding to one of several values, which an action sets by its index."""
-    return Bound(lambda frame: values(frame)[index], lambda _, value: action(index, value))
+    return ControlBinding(lambda frame: values(frame)[index], lambda _, value: action(index, value))
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class At:
     convert: Callable[[Any], Any] = lambda value: value
     action: type[Set] = Set
 
-    def bound(self, name: str, options: Mapping[str, object] | None = None) -> Bound[Any]:
+    def bound(self, name: str, options: Mapping[str, object] | None = None) -> ControlBinding[Any]:
         """Return the binding.
 
         Args:
@@ -60,31 +60,33 @@ class At:
         """
         if options is not None:
             texts = {value: text for text, value in options.items()}
-            return Bound(
+            return ControlBinding(
                 lambda frame: texts[self._read(frame)],
                 lambda _, text: self.action(self.path, options[text], name, text),
             )
-        return Bound(self._read, lambda _, value: self.action(self.path, self.convert(value), name))
+        return ControlBinding(
+            self._read, lambda _, value: self.action(self.path, self.convert(value), name)
+        )
 
     def _read(self, frame: Frame) -> Any:
         value = value_at(frame.state, self.path)
         return self.default(frame.state) if value is None and self.default else value
 
 
-Source: TypeAlias = str | At | Bound[Value]
+Source: TypeAlias = str | At | ControlBinding[Value]
 """The source of a control's value; a text is the path of a plain value."""
 
 
 def bound_to(
     at: Source[Value], name: str, options: Mapping[str, object] | None = None
-) -> Bound[Value]:
+) -> ControlBinding[Value]:
     """Return a binding itself, or the binding to the value at a path."""
-    if isinstance(at, Bound):
+    if isinstance(at, ControlBinding):
         return at
     return (At(at) if isinstance(at, str) else at).bound(name, options)
 
 
-def in_unit(bound: Bound[Any], power: int) -> Bound[Any]:
+def in_unit(bound: ControlBinding[Any], power: int) -> ControlBinding[Any]:
     """Return the binding of a control that shows lengths, or a power of them, in the view's unit.
 
     Of several values, one that is written back as it was shown keeps its exact value.
@@ -105,7 +107,7 @@ def in_unit(bound: Bound[Any], power: int) -> Bound[Any]:
             return replace(action, text=f"{text} {unit.name}")
         return action
 
-    return Bound(read, write)
+    return ControlBinding(read, write)
 
 
 def parts_of(value: Any) -> tuple[float, ...]:

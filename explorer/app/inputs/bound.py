@@ -14,7 +14,7 @@ from typing import Any, Generic, TypedDict
 
 import viser
 
-from explorer.app.inputs.bindings import Bound, Value, parts_of
+from explorer.app.inputs.bindings import ControlBinding, Value, parts_of
 from explorer.app.inputs.ranges import Intervals, Span, Track, decimals, tint_marks
 from explorer.app.session.session import Session
 from explorer.app.state.actions import Action
@@ -46,7 +46,7 @@ class Control(Generic[Value]):
 
     session: Session
     handle: viser.GuiInputHandle[Value]
-    bound: Bound[Value]
+    bound: ControlBinding[Value]
     disabled: Condition | None = None
     visible: Condition | None = None
     step: Callable[[State], float] | None = None

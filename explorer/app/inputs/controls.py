@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol, Unpack
 import viser
 
 from explorer.app.inputs.bindings import (
-    Bound,
+    ControlBinding,
     Source,
     Value,
     bound_to,
@@ -47,8 +47,8 @@ class Controls:
     """Makes controls and keeps them in step with the state.
 
     Most controls name the path of a plain value of the state, such as "view.singular.ball", from
-    which reading, writing and the words of the history follow; `At` says more of it. A `Bound`
-    binds a control to a value that is not plain.
+    which reading, writing and the words of the history follow; `At` says more of it. A
+    `ControlBinding` binds a control to a value that is not plain.
 
     Args:
         page: The page, to which the controls are added in the order of the calls.
@@ -115,7 +115,7 @@ class Controls:
         self,
         label: str,
         hint: str,
-        at: Bound[Pair],
+        at: ControlBinding[Pair],
         span: Callable[[State], Span],
         *,
         power: int = 0,
@@ -268,7 +268,7 @@ class Controls:
 
     def _bound(
         self, handle: viser.GuiInputHandle[Any], at: Source[Any], label: str, *, power: int
-    ) -> Bound[Any]:
+    ) -> ControlBinding[Any]:
         """Return the binding of a control whose label may have the unit of lengths."""
         name, _, unit = label.partition(" ({unit")
         if unit:
@@ -279,7 +279,7 @@ class Controls:
     def _bind(
         self,
         handle: viser.GuiInputHandle[Value],
-        bound: Bound[Value],
+        bound: ControlBinding[Value],
         step: Callable[[State], float] | None = None,
         **conditions: Unpack[Conditions],
     ) -> Control[Value]:

@@ -5,26 +5,26 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.ranges import Span, span_around
 from explorer.app.state.actions import Set
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design, Pair
-from explorer.workspace.limits.table import LIMITS, Entry, Limit, Switch
+from explorer.workspace.limits.table import LIMITS, Limit, LimitSlider, Switch
 
 ANGLE_STEP = 0.5
 
 
 @functools.lru_cache(256)
-def limit_span(base: Design, entry: Entry) -> Span:
+def limit_span(base: Design, entry: LimitSlider) -> Span:
     """Return the range of a slider, which follows the design as it was opened."""
     if entry.is_angle:
         return Span(*entry.track(base), ANGLE_STEP)
     return span_around(entry.track(base), base.reach, entry.least)
 
 
-def bound_switch(switch: Switch) -> Bound[bool]:
+def bound_switch(switch: Switch) -> ControlBinding[bool]:
     """Return the binding of a checkbox to all fields that have it."""
 
     def write(state: State, on: bool) -> Set:
@@ -36,7 +36,7 @@ def bound_switch(switch: Switch) -> Bound[bool]:
             limits = with_value(limits, limit.path, value)
         return Set("design.limits", limits, switch.label, "on" if on else "off")
 
-    return Bound(
+    return ControlBinding(
         lambda frame: all(
             switch.is_on(limit.value(frame.state.design)) for limit in _limits_of(switch)
         ),
@@ -44,7 +44,7 @@ def bound_switch(switch: Switch) -> Bound[bool]:
     )
 
 
-def bound_entry(limit: Limit, entry: Entry) -> Bound[Any]:
+def bound_entry(limit: Limit, entry: LimitSlider) -> ControlBinding[Any]:
     """Return the binding of a slider to a field."""
 
     def write(state: State, new: Any) -> Set:
@@ -61,7 +61,7 @@ def bound_entry(limit: Limit, entry: Entry) -> Bound[Any]:
         # A maximum at the reach stays there while only the minimum is moved.
         return Set(path, (low, None if value[1] is None and high == before[1] else high))
 
-    return Bound(lambda frame: _visible_value(frame.state, limit, entry), write)
+    return ControlBinding(lambda frame: _visible_value(frame.state, limit, entry), write)
 
 
 def push_other_end(before: Pair, after: Pair) -> Pair:
@@ -76,7 +76,7 @@ def _limits_of(switch: Switch) -> list[Limit]:
     return [limit for limit in LIMITS if limit.switch is switch]
 
 
-def _visible_value(state: State, limit: Limit, entry: Entry) -> Any:
+def _visible_value(state: State, limit: Limit, entry: LimitSlider) -> Any:
     """Return what a slider shows: a number, or the ends of a range."""
     value = _value(state, limit)
     if entry.is_number:

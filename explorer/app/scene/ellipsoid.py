@@ -16,7 +16,7 @@ from explorer.singularity.colours import FAR, Rgb
 OPACITY = 0.3
 
 
-class Ellipsoid:
+class EllipsoidNode:
     """An ellipsoid in a scene, at the node of a name."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:

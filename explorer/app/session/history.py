@@ -45,7 +45,7 @@ class UserAction:
     press: Press | None = None
     who: int | None = None
 
-    def continues(self, earlier: Gesture | Step) -> bool:
+    def continues(self, earlier: Gesture | HistoryStep) -> bool:
         """Whether this continues an earlier gesture with the same control."""
         press = earlier.press
         if self.source != earlier.source:
@@ -78,7 +78,7 @@ class UserAction:
 
 
 @dataclass(frozen=True)
-class Step:
+class HistoryStep:
     """One step of the history.
 
     Attributes:
@@ -110,12 +110,12 @@ class History:
         is_open: Whether further events may extend the present step; not after undo or redo.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[HistoryStep, ...]
     at: int = 0
     is_open: bool = False
 
     @property
-    def step(self) -> Step:
+    def step(self) -> HistoryStep:
         """The step that the page shows."""
         return self.steps[self.at]
 
@@ -141,7 +141,7 @@ class History:
             step = replace(present, words=words, state=after, last=event.time, press=press)
             return History((*earlier, step), self.at, is_open=True)
         number, source = present.number + 1, event.source
-        step = Step(number, words, after, source, event.time, event.press, event.who)
+        step = HistoryStep(number, words, after, source, event.time, event.press, event.who)
         steps = (*earlier, present, step)[-MOST_STEPS:]
         return History(steps, len(steps) - 1, is_open=True)
 
@@ -185,7 +185,7 @@ class History:
 
 def start_history(state: State) -> History:
     """Return the history of a design that has just been opened."""
-    return History((Step(0, f"Open {state.design.name}", state.for_step()),))
+    return History((HistoryStep(0, f"Open {state.design.name}", state.for_step()),))
 
 
 def check_drawable(state: State) -> None:

@@ -35,7 +35,7 @@ _COPY = re.compile(r" copy( \d+)?$")
 
 
 @dataclass(frozen=True)
-class Entry:
+class LibraryFile:
     """A file in the library.
 
     Its name is that of the design, or of the file if the design cannot be used; the problem then
@@ -55,15 +55,15 @@ class Library:
         self.folder = data_folder() / DESIGNS if folder is None else folder
         self._trash = self.folder / TRASH
 
-    def list(self) -> tuple[Entry, ...]:
+    def list(self) -> tuple[LibraryFile, ...]:
         """Return all entries: the design saved last first, unusable files last."""
-        entries: list[Entry] = []
+        entries: list[LibraryFile] = []
         names: set[str] = set()
         for path in newest_first(self.folder):
             entry = _read(path)
             if entry.design is not None and entry.name in names:
                 problem = f"another file has the name {entry.name!r} too; change it in one of them"
-                entry = Entry(entry.file, entry.file, None, problem)
+                entry = LibraryFile(entry.file, entry.file, None, problem)
             names.add(entry.name)
             entries.append(entry)
         return tuple(sorted(entries, key=lambda each: each.design is None))
@@ -152,7 +152,7 @@ class Library:
         else:
             move(path, self.folder / path.name)
 
-    def _designs(self) -> dict[str, Entry]:
+    def _designs(self) -> dict[str, LibraryFile]:
         return {each.name: each for each in self.list() if each.design is not None}
 
     @staticmethod
@@ -161,7 +161,7 @@ class Library:
         write_whole(folder / file, encode_design(design))
         _date(folder / file)
 
-    def _entry(self, name: str) -> Entry:
+    def _entry(self, name: str) -> LibraryFile:
         entries = self.list()
         for entry in entries:
             if entry.name in (name, tidy_name(name)):
@@ -196,10 +196,10 @@ def _date(path: Path) -> None:
         os.utime(path, ns=(now, now))
 
 
-def _read(path: Path) -> Entry:
+def _read(path: Path) -> LibraryFile:
     printable = "".join(c if c.isprintable() else "�" for c in path.name)
     try:
         design = decode_design(read_at_most(path), repr(printable))
     except InputError as error:
-        return Entry(printable, path.name, None, str(error))
-    return Entry(design.name, path.name, design)
+        return LibraryFile(printable, path.name, None, str(error))
+    return LibraryFile(design.name, path.name, design)

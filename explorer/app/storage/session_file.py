@@ -22,7 +22,7 @@ from typing import Annotated, Any, cast, get_type_hints
 import msgspec
 from filelock import FileLock
 
-from explorer.app.session.history import History, Step
+from explorer.app.session.history import History, HistoryStep
 from explorer.app.state.parts import FEATURE_PARTS, FeaturePart, saved_fields, value_at
 from explorer.app.state.state import State
 from explorer.errors import InputError, StorageError
@@ -203,11 +203,11 @@ def decode_session(data: bytes, source: str) -> History:
 
 
 def _history_of(body: _Body) -> History:
-    steps, values, kinds = list[Step](), dict[str, Any](), _kinds()
+    steps, values, kinds = list[HistoryStep](), dict[str, Any](), _kinds()
     for number, step in enumerate(body.steps, body.first):
         for path, raw in step.changes.items():
             values[path] = msgspec.convert(raw, kinds[path], dec_hook=_part_of)
-        steps.append(Step(number, step.words, _state_of(values)))
+        steps.append(HistoryStep(number, step.words, _state_of(values)))
     if not body.at < len(steps):
         raise InputError(f"there is no step {body.at}")
     return History(tuple(steps), body.at)

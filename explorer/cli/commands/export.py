@@ -46,7 +46,7 @@ COMMON = ("what", "out", "format", "design", "json")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
+class ExportCommand(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     """Write workspace, parts, models, pages, a figure or code for controllers as files.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
@@ -162,7 +162,7 @@ def _as_lines(facts: Facts) -> Iterator[str]:
         yield f"leg {actuator['leg']}: stroke {stroke} mm (the limits require {asked} mm)"
 
 
-def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
+def _mesh(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     if command.what == "workspace" and file_format in ("step", "stp"):
         return _step(command)
     mesh.check_format(file_format, mesh.FORMATS, "mesh")
@@ -190,13 +190,13 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
     return data, {**facts, "agrees": False} if solid.agrees is False else facts
 
 
-def _name(command: Export, design: Design) -> str:
+def _name(command: ExportCommand, design: Design) -> str:
     whose = "" if command.at == "b4" else "the tool of "
     holding = "" if command.load is None else " that holds the load"
     return f"{command.what}{holding} of {whose}{design.name}"
 
 
-def _step(command: Export) -> tuple[bytes, Facts]:
+def _step(command: ExportCommand) -> tuple[bytes, Facts]:
     if command.load is not None:
         raise InputError(
             "STEP takes exact faces, and the surface along which a part takes its limit consists "
@@ -215,7 +215,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
     return step.step_bytes(solid, _name(command, design)), facts
 
 
-def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
+def _mechanism(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     mesh.check_format(file_format, assembly.FORMATS, "assembly")
     if file_format == "step":
@@ -239,7 +239,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     }
 
 
-def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
+def _simulation(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
     design, density = command.read_design(), command.density or DENSITY
@@ -256,7 +256,7 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
     return model.text().encode(), {**_simulation_json(model), **facts}
 
 
-def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
+def _scene(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     _check_format(file_format, "scene", "html", "htm")
     design = command.read_design()
     pose = command.pose(design)
@@ -275,13 +275,13 @@ def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
     return data, {"format": "html", "bytes": len(data)}
 
 
-def _page(command: Export, file_format: str) -> tuple[bytes, Facts]:
+def _page(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     _check_format(file_format, "page", "html", "htm")
     data = moving_page(command.read_design())
     return data, {"format": "html", "bytes": len(data)}
 
 
-def _figure(command: Export, file_format: str) -> tuple[bytes, Facts]:
+def _figure(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     _check_format(file_format, "figure", "svg")
     design = command.read_design()
     snapshot = evaluate(design, command.pose(design))
@@ -294,7 +294,7 @@ def _figure(command: Export, file_format: str) -> tuple[bytes, Facts]:
     return data, {"format": "svg", "bytes": len(data)}
 
 
-def _folder(command: Export, file_format: str) -> tuple[dict[str, bytes], Facts]:
+def _folder(command: ExportCommand, file_format: str) -> tuple[dict[str, bytes], Facts]:
     name, only, files_of = _FOLDERS[command.what]
     _check_format(file_format, name, only)
     files = files_of(command.read_design())
@@ -313,7 +313,7 @@ _FOLDERS: dict[What, tuple[str, str, Callable[[Design], dict[str, bytes]]]] = {
     "linuxcnc": ("configuration", "ini", linuxcnc_files),
 }
 """Of each object that is a folder: its name in words, its format, and what gives its files."""
-_WRITERS: dict[What, tuple[Callable[[Export, str], tuple[Data, Facts]], tuple[str, ...]]] = {
+_WRITERS: dict[What, tuple[Callable[[ExportCommand, str], tuple[Data, Facts]], tuple[str, ...]]] = {
     "workspace": (_mesh, ("tolerance", "load", *_ORIENTATION)),
     "hull": (_mesh, ("tolerance", "load", *_ORIENTATION)),
     "mechanism": (_mechanism, ("density",)),

@@ -23,7 +23,7 @@ MOST_STEPS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interference(
+class InterferenceCommand(
     options.JsonOptions, options.RadiiOptions, options.EndOptions, options.PoseOptions
 ):
     """Measure the clearances of the legs, in a pose or over a move.

@@ -31,7 +31,7 @@ from explorer.workspace.limits.table import joint_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
-class Inverse(options.JsonOptions, options.PoseOptions):
+class InverseCommand(options.JsonOptions, options.PoseOptions):
     """Compute the joints of a pose, or of a table of poses.
 
     Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design and the legs that collide
@@ -99,13 +99,15 @@ def _files(option: str, table: Path | None, out: Path | None) -> tuple[Path, Pat
     return table, out
 
 
-def _read_table(path: Path, design: Design) -> pose_tables.Table:
+def _read_table(path: Path, design: Design) -> pose_tables.PoseTable:
     data = read_at_most(path)
     return pose_tables.parse_table(str(path), data, design.unit_mm)
 
 
 def _write_answer(
-    command: Inverse | Forward, files: tuple[Path, Path], answer: pose_tables.TableAnswer
+    command: InverseCommand | ForwardCommand,
+    files: tuple[Path, Path],
+    answer: pose_tables.TableAnswer,
 ) -> None:
     """Write the table of an answer, and how many of its lines are within the limits."""
     table, out = files
@@ -130,7 +132,7 @@ def _write_answer(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Forward(options.JsonOptions, options.PointOptions):
+class ForwardCommand(options.JsonOptions, options.PointOptions):
     """Compute the eight assembly modes of the joints, or of a table of joints.
 
     All eight are real or none is. If none is, the exit status is 1 and the message names the
@@ -259,7 +261,7 @@ def _least_change(design: Design, joints: FloatArray) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Singularity(options.JsonOptions, options.PoseOptions):
+class SingularityCommand(options.JsonOptions, options.PoseOptions):
     """Measure how near a pose is to a singularity, and to which.
 
     A margin is zero where its tetrahedron is flat; δ1 and δ3 are distances, δ2 is a distance times

@@ -28,7 +28,7 @@ from explorer.optimise.problem import Box, ObjectiveName, Problem, Variable, wit
 
 
 @dataclass(frozen=True, kw_only=True)
-class Optimise(options.JsonOptions, options.DesignOptions):
+class OptimiseCommand(options.JsonOptions, options.DesignOptions):
     """Optimise a design by SQP: match a volume, shorten the longest leg, or others.
 
     The gradients are exact, and the search starts from a given design, whose limits hold

@@ -22,7 +22,7 @@ FORMATS: dict[str, Literal["html", "pdf"]] = {".html": "html", ".htm": "html", "
 
 
 @dataclass(frozen=True, kw_only=True)
-class Serve:
+class ServeCommand:
     """Serve the explorer's page and open it in the browser (the default)."""
 
     design: Annotated[str | None, tyro.conf.arg(metavar=values.DESIGN_NAME)] = None
@@ -71,7 +71,7 @@ class Serve:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report(JsonOptions, PoseOptions):
+class ReportCommand(JsonOptions, PoseOptions):
     """Write a report of a design: drawings, slices, tables, and how to reproduce it.
 
     The figures are those of the other commands, in the home pose unless a pose is given. HTML
@@ -104,7 +104,7 @@ class Report(JsonOptions, PoseOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Screenshot(JsonOptions, PoseOptions):
+class ScreenshotCommand(JsonOptions, PoseOptions):
     """Draw a pose into a PNG file.
 
     Writes the path of the file to standard output. Needs the extra "screenshot" and a

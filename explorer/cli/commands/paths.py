@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path as File
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -81,7 +81,7 @@ class TimedOptions(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Path(TimedOptions):
+class PathCommand(TimedOptions):
     """Plan a path between two poses within limits, margins and clearances.
 
     Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
@@ -96,11 +96,11 @@ class Path(TimedOptions):
     seconds: Annotated[float, values.POSITIVE] = 2.0
     """Longest time to search for a path, in seconds."""
 
-    out: Annotated[File | None, values.hint("optional", "FILE.csv")] = None
+    out: Annotated[Path | None, values.hint("optional", "FILE.csv")] = None
     """File for the trajectory as CSV: time, joints and pose, and the tool's position with `--at
     tool`."""
 
-    corners: Annotated[File | None, values.hint("optional", "FILE.csv")] = None
+    corners: Annotated[Path | None, values.hint("optional", "FILE.csv")] = None
     """File for the corners of the path as CSV, for `explorer drives --path`."""
 
     def run(self) -> None:
@@ -195,7 +195,7 @@ def _path_lines(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drives(TimedOptions):
+class DrivesCommand(TimedOptions):
     """Compute speeds, forces and powers of the actuators along a path; one motor for all.
 
     A path rests at every corner. It takes the shortest time within the design's limits of speeds,
@@ -204,7 +204,7 @@ class Drives(TimedOptions):
     friction and the rotors of motors are left out.
     """
 
-    path: Annotated[File | None, values.hint("instead of --from and --to", "FILE")] = None
+    path: Annotated[Path | None, values.hint("instead of --from and --to", "FILE")] = None
     """Corners of the path: a table of poses as that of `explorer inverse --poses`, such as
     `explorer path --corners` writes."""
 
@@ -218,7 +218,7 @@ class Drives(TimedOptions):
     density: Annotated[float, values.POSITIVE] = DENSITY
     """Density of the legs and the platform in kg/m³, as bars with the legs' radii."""
 
-    out: Annotated[File | None, values.hint("optional", "FILE.csv")] = None
+    out: Annotated[Path | None, values.hint("optional", "FILE.csv")] = None
     """File for a table: time in s, then joints and pose in mm, speeds in mm/s, forces in N and
     powers in W."""
 

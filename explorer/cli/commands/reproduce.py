@@ -20,7 +20,7 @@ WIDTH = 96
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reproduce(JsonOptions):
+class ReproduceCommand(JsonOptions):
     """Measure the claims of the paper again, and judge each.
 
     A claim is confirmed, confirmed within a condition, not confirmed, or not testable from the

@@ -59,7 +59,7 @@ def singular_error(pose: Pose, words: str) -> NoAnswerError:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Forces(LoadOptions):
+class ForcesCommand(LoadOptions):
     """Compute the forces of actuators and struts under a load, and their limits.
 
     Positive forces push a joint's value up. Legs 2 and 3 carry a force along the guide too, which
@@ -161,7 +161,7 @@ def _force_lines(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Accuracy(options.TypicalOptions, LoadOptions):
+class AccuracyCommand(options.TypicalOptions, LoadOptions):
     """Compute the errors and the deflection of the tool in a pose.
 
     Errors, stiffness, struts and tolerances are those of the design; a design without them is
@@ -229,7 +229,7 @@ WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in
 
 
 @dataclass(frozen=True, kw_only=True)
-class Budget(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
+class BudgetCommand(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     """Rank what tolerances cost in precision; find those of a wanted precision.
 
     The sources of errors are the six actuators and the 23 dimensions. The worst error is exact for

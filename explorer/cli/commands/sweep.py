@@ -21,7 +21,7 @@ from explorer.sweep.run import Progress, run_study
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sweep(options.JsonOptions):
+class SweepCommand(options.JsonOptions):
     """Measure the designs of a study, on every core or a cluster; list the Pareto front.
 
     The results are Parquet files; after an interruption at any point the same command continues.

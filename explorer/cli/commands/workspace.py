@@ -34,7 +34,7 @@ SAMPLES_OF_TILT = 33
 
 
 @dataclass(frozen=True, kw_only=True)
-class Workspace(
+class WorkspaceCommand(
     options.JsonOptions, options.RadiiOptions, options.OrientationOptions, options.PointOptions
 ):
     """Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.
@@ -303,7 +303,7 @@ NOT_CONNECTED = "not connected to tilt zero by a tilt within the limits"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Orientation(options.JsonOptions, options.PointOptions):
+class OrientationCommand(options.JsonOptions, options.PointOptions):
     """Measure the orientations of a position: share of all, greatest tilts, torsion.
 
     The platform tilts from tilt zero, at one torsion and in each azimuth, until it meets the first

@@ -1,7 +1,7 @@
 """The demands of a problem as smooth functions with their exact gradients.
 
 Each demand is dimensionless and of about unit size: at least zero where it is met, or
-exactly zero for an equality. All are measured at a `State`.
+exactly zero for an equality. All are measured at a `SearchState`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.margins import SINGULAR, margins, planes_of_singularity
 from explorer.numerics.arrays import BoolArray, FloatArray, dot, lengths_of
 from explorer.optimise.problem import SHIFTS, distances_of
-from explorer.optimise.search.state import NOWHERE, State
+from explorer.optimise.search.state import NOWHERE, SearchState
 from explorer.proofs.limits import AXES_OF_LEGS, BoxLimits, End, prove_limits, tilted_rotations
 from explorer.proofs.proof import Proof
 from explorer.workspace.limits import quantities
@@ -40,7 +40,7 @@ class Measured(NamedTuple):
     gradients: FloatArray
 
 
-class Demand(ABC):
+class SearchDemand(ABC):
     """One or several conditions of one kind.
 
     Attributes:
@@ -56,10 +56,10 @@ class Demand(ABC):
     places = NOWHERE
 
     @abstractmethod
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return the values and their derivatives."""
 
-    def find_unproven(self, state: State) -> list[Proof]:
+    def find_unproven(self, state: SearchState) -> list[Proof]:
         """Return what is not proven at a state, and look at its poses too from now on.
 
         There is nothing to prove of a demand that `measure` decides exactly.
@@ -68,7 +68,7 @@ class Demand(ABC):
         return []
 
 
-class VolumeDemand(Demand):
+class VolumeDemand(SearchDemand):
     """The volume of the workspace, exactly or at least, by its nearly linear cube root."""
 
     def __init__(self, volume: float, *, is_equality: bool) -> None:
@@ -76,26 +76,26 @@ class VolumeDemand(Demand):
         self.is_equality = is_equality
         self.names = (CATALOGUE["volume"].label,)
 
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return (V / V′)^⅓ − 1."""
         root, gradient = state.volume_root(self.volume)
         return Measured(np.array([root - 1.0]), gradient[None, :])
 
 
-class ReachDemand(Demand):
+class ReachDemand(SearchDemand):
     """A longest leg of at most some length."""
 
     def __init__(self, reach: float) -> None:
         self.reach = reach
         self.names = (CATALOGUE["longest_leg"].label,)
 
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return 1 − reach / largest."""
         value, gradient = state.longest_leg
         return Measured(np.array([1.0 - value / self.reach]), -gradient[None, :] / self.reach)
 
 
-class DegenerateDemand(Demand):
+class DegenerateDemand(SearchDemand):
     """The distances from degenerate designs, on the side where a run starts.
 
     They are linear, so no step of the solver breaks them after a start that keeps them.
@@ -103,11 +103,11 @@ class DegenerateDemand(Demand):
 
     names = ("distance from a3y = 0", "distance from b1y = 0", "distance from b2 = b3")
 
-    def __init__(self, least: float, start: State) -> None:
+    def __init__(self, least: float, start: SearchState) -> None:
         self.least = least
         self.signs = np.sign(_distances(start))
 
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return sign · distance − least, over the size of the start."""
         size = state.problem.size
         rows = state.rows(("a3y", "b1y", "b3"))
@@ -116,11 +116,11 @@ class DegenerateDemand(Demand):
         return Measured(values / size, self.signs[:, None] * rows / size)
 
 
-def _distances(state: State) -> FloatArray:
+def _distances(state: SearchState) -> FloatArray:
     return np.array([*distances_of(state.design).values()])
 
 
-class GapDemand(Demand):
+class GapDemand(SearchDemand):
     """The smallest gap of the carriages, in the order that they have where a run starts.
 
     The order itself is no demand: each design keeps that of its own home pose.
@@ -129,10 +129,10 @@ class GapDemand(Demand):
     is_limit = True
     names = (GAP,)
 
-    def __init__(self, start: State) -> None:
+    def __init__(self, start: SearchState) -> None:
         self.sign = 1.0 if _gap(start) >= 0.0 else -1.0
 
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return sign · (d3 − d1) − gap, over the size of the start."""
         size, u = state.problem.size, state.rotation[:, 0]
         span = state.design.b3 - state.design.b2
@@ -141,11 +141,11 @@ class GapDemand(Demand):
         return Measured(np.array([value / size]), self.sign * slope[None, :] / size)
 
 
-def _gap(state: State) -> float:
+def _gap(state: SearchState) -> float:
     return (state.design.b3 - state.design.b2) * float(state.rotation[0, 0])
 
 
-class Look(NamedTuple):
+class CheckedTilt(NamedTuple):
     """A tilt at which a limit over a box is looked at, angles in degrees.
 
     Attributes:
@@ -161,7 +161,7 @@ class Look(NamedTuple):
     window: float = 0.0
 
 
-class BoxDemand(Demand):
+class BoxDemand(SearchDemand):
     """A required box within the workspace, at home's orientation and at all tilts up to one.
 
     A box whose corners lie within a convex limit lies within it; for a half-space the worst corner
@@ -175,20 +175,20 @@ class BoxDemand(Demand):
 
     is_limit = True
 
-    def __init__(self, start: State, tilt: float | None) -> None:
+    def __init__(self, start: SearchState, tilt: float | None) -> None:
         self.tilt = tilt
         over = BoxLimits(start.design, start.box, start.rotation)
-        self.looks: dict[str, list[Look]] = {}
+        self.looks: dict[str, list[CheckedTilt]] = {}
         for end in over.ends:
             # At home's orientation `GapDemand` demands what is the same in every position.
             is_of_carriages = end.quantity == quantities.ORDER
-            self.looks[end.name] = [] if is_of_carriages else [*map(Look, _corners(end))]
+            self.looks[end.name] = [] if is_of_carriages else [*map(CheckedTilt, _corners(end))]
             for sector in range(SECTORS if tilt is not None and over.rate(end) > 0.0 else 0):
                 self._look(end, 360.0 * sector / SECTORS, tilt or 0.0, 180.0 / SECTORS)
         self._name()
 
     def _look(self, end: End, azimuth: float, tilt: float, window: float) -> None:
-        self.looks[end.name] += [Look(each, azimuth, tilt, window) for each in _corners(end)]
+        self.looks[end.name] += [CheckedTilt(each, azimuth, tilt, window) for each in _corners(end)]
 
     def _name(self) -> None:
         self.names = tuple(
@@ -197,7 +197,7 @@ class BoxDemand(Demand):
             for look in looks
         )
 
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return the slacks that are looked at, over the size; with a tilt, less a reserve."""
         over, size = BoxLimits(state.design, state.box, state.rotation), state.problem.size
         ends = {end.name: end for end in over.ends}
@@ -210,7 +210,7 @@ class BoxDemand(Demand):
         reserve = 0.0 if self.tilt is None else RESERVE
         return Measured(np.concatenate(values) / size - reserve, np.vstack(gradients) / size)
 
-    def find_unproven(self, state: State) -> list[Proof]:
+    def find_unproven(self, state: SearchState) -> list[Proof]:
         """Return the limits that are missed, or not proven, at a tilt, and look there for each."""
         if self.tilt is None:
             return []
@@ -249,7 +249,7 @@ def _corners(end: End) -> FloatArray:
     return CORNERS if is_along else CORNERS[::2]
 
 
-def _slacks_of(over: BoxLimits, end: End, looks: list[Look], state: State) -> Measured:
+def _slacks_of(over: BoxLimits, end: End, looks: list[CheckedTilt], state: SearchState) -> Measured:
     """Return the slacks of an end of a limit at k looks, and their derivatives."""
     corners = over.lows + np.array([look.corner for look in looks]) * (over.highs - over.lows)
     tilts = np.array([(state.yaw + look.azimuth, look.tilt) for look in looks])
@@ -287,7 +287,7 @@ def _slacks_of(over: BoxLimits, end: End, looks: list[Look], state: State) -> Me
     return Measured(slack, end.side * (state.along(end.bound.rates) - change))
 
 
-class MarginDemand(Demand):
+class MarginDemand(SearchDemand):
     """The margins over a required box, on one side of each singular plane.
 
     Margins are linear in p, so that the corners of the box have the worst one. The side is that
@@ -298,14 +298,14 @@ class MarginDemand(Demand):
 
     names = tuple(f"margin δ{i} over the required box" for i in (1, 2, 3))
 
-    def __init__(self, start: State, *, is_open: bool = False) -> None:
+    def __init__(self, start: SearchState, *, is_open: bool = False) -> None:
         self.is_open = is_open
         self._signs: FloatArray | None = None
         if start.design.limits.margin is None:
             middle = planes_of_singularity(start.rotation) @ np.mean(start.box, axis=0)
             self._signs = np.where(middle == 0.0, start.design.home_signs, np.sign(middle))
 
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return sign · δ at the corner that is worst for each δ, over the size of the start."""
         corners, r, size = corners_of(state.box), state.rotation, state.problem.size
         signs = self._signs_at(state)
@@ -322,11 +322,11 @@ class MarginDemand(Demand):
             values = np.where(is_clear, values, np.minimum(values, 0.0) - 2.0 * MET)
         return Measured(values, signs[:, None] * gradients / size)
 
-    def keeps(self, state: State, positions: FloatArray) -> BoolArray:
+    def keeps(self, state: SearchState, positions: FloatArray) -> BoolArray:
         """Return whether positions (n, 3) are on the side of all planes, shape (n,)."""
         least = SINGULAR * lengths_of(positions)
         signed = self._signs_at(state) * margins(positions, state.rotation)
         return np.asarray((signed > least[:, None]).all(axis=1))
 
-    def _signs_at(self, state: State) -> FloatArray:
+    def _signs_at(self, state: SearchState) -> FloatArray:
         return np.array(state.design.home_signs) if self._signs is None else self._signs

@@ -30,8 +30,8 @@ from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.cells import CellValues
 from explorer.optimise.problem import SHIFTS, Problem
-from explorer.optimise.search.demands import CORNERS, RESERVE, Demand, MarginDemand, Measured
-from explorer.optimise.search.state import State
+from explorer.optimise.search.demands import CORNERS, RESERVE, MarginDemand, Measured, SearchDemand
+from explorer.optimise.search.state import SearchState
 from explorer.proofs.proof import Proof, proofs_of
 from explorer.proofs.statics import prove_deflection, prove_error, prove_load
 from explorer.statics import slopes
@@ -92,7 +92,7 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
     return positions[within & clear]
 
 
-class ClearanceDemand(Demand):
+class ClearanceDemand(SearchDemand):
     """The least clearance of each pair, in design units, over some positions (k, 3)."""
 
     names = tuple(f"clearance of legs {first} and {second}" for first, second in PAIRS)
@@ -101,7 +101,7 @@ class ClearanceDemand(Demand):
         self.clearance = clearance
         self.positions = positions
 
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return the bounds of the six pairs over the clearance, and their derivatives."""
         sharp, p = SHARPNESS / self.clearance, self.positions
         axes, points, distance, spare = self._spare(state)
@@ -121,7 +121,7 @@ class ClearanceDemand(Demand):
             gradients -= shares.T @ state.slack(limit, p[rows])[1]
         return Measured(least / sharp / self.clearance - RESERVE, gradients / self.clearance)
 
-    def worst(self, state: State) -> tuple[float, str]:
+    def worst(self, state: SearchState) -> tuple[float, str]:
         """Return the least of the values that `measure` bounds from below, and its pair."""
         spare, (_, outside) = self._spare(state)[-1], self._outside(state)
         kept = np.maximum(spare, outside.max(axis=0)[:, None])
@@ -129,7 +129,7 @@ class ClearanceDemand(Demand):
         pair = int(least.argmin())
         return float(least[pair]), self.names[pair]
 
-    def find_unproven(self, state: State) -> list[Proof]:
+    def find_unproven(self, state: SearchState) -> list[Proof]:
         """Return the pairs that are, or may be, too near in the workspace, and look there too."""
         least = least_clearances(
             state.workspace,
@@ -144,7 +144,7 @@ class ClearanceDemand(Demand):
         self.positions = np.vstack([self.positions, attained])
         return [proof for proof in proofs if not proof.is_proven]
 
-    def _spare(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _spare(self, state: SearchState) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return axes of the legs, closest points, distances, and distances less the demanded."""
         p = self.positions
         axes = leg_axes(Configuration(state.design, p, state.rotation))
@@ -154,7 +154,7 @@ class ClearanceDemand(Demand):
         spare[:, joined_pairs(state.design)] = FAR * state.problem.size
         return axes, points, distance, spare
 
-    def _outside(self, state: State) -> tuple[list[BallOrCylinder | HalfSpace], FloatArray]:
+    def _outside(self, state: SearchState) -> tuple[list[BallOrCylinder | HalfSpace], FloatArray]:
         """Return the limits that offer a way out, and how far each position is outside them."""
         # A limit that no position satisfies, such as the gap, has its own demand: as a way out
         # it would make the bound leap, from far below zero to met, where that is missed by little.
@@ -170,7 +170,11 @@ def _log_sum(values: FloatArray) -> FloatArray:
 
 
 def _distance_slopes(
-    state: State, axes: FloatArray, points: FloatArray, distance: FloatArray, weights: FloatArray
+    state: SearchState,
+    axes: FloatArray,
+    points: FloatArray,
+    distance: FloatArray,
+    weights: FloatArray,
 ) -> FloatArray:
     """Return the weighted sums of the derivatives of the distances of each pair, shape (6, n).
 
@@ -195,7 +199,7 @@ def _distance_slopes(
     return sums @ state.rows(PARAMETERS)
 
 
-def _end_motions(state: State) -> FloatArray:
+def _end_motions(state: SearchState) -> FloatArray:
     """Return the derivatives of both ends of each leg by `PARAMETERS`, p held, (4, 2, 7, 3)."""
     design, r = state.design, state.rotation
     u, v = r[:, 0], r[:, 1]
@@ -240,7 +244,7 @@ def _spare(share: FloatArray, by: FloatArray) -> Measured:
     return Measured(spare_of(share), by * (-1.0 / np.maximum(1.0, share) ** 2)[:, None])
 
 
-class StaticsDemand(Demand):
+class StaticsDemand(SearchDemand):
     """What parts of the machine have everywhere in the required box must be at most something.
 
     A search looks at the corners of the box, and where more was found later. If nothing is given,
@@ -248,14 +252,14 @@ class StaticsDemand(Demand):
     nothing is larger than what is told.
     """
 
-    def __init__(self, start: State, most: float | None, parts: Sequence[str]) -> None:
+    def __init__(self, start: SearchState, most: float | None, parts: Sequence[str]) -> None:
         self.side, self.parts = MarginDemand(start, is_open=True), parts
         self.most = most or _scale_of(start, self.amounts) or 1.0
         self.is_given = most is not None
         self.places = CORNERS
         self.names = (*parts,) * len(self.places)
 
-    def measure(self, state: State) -> Measured:
+    def measure(self, state: SearchState) -> Measured:
         """Return what each part has to spare at each place, less a reserve; see `spare_of`."""
         lows, highs = np.array(state.box)
         positions = lows + self.places * (highs - lows)
@@ -271,7 +275,7 @@ class StaticsDemand(Demand):
         values, gradients = spare[rows, parts], slopes[rows, parts]
         return Measured(values.ravel() - RESERVE, gradients.reshape(-1, slopes.shape[-1]))
 
-    def find_unproven(self, state: State) -> list[Proof]:
+    def find_unproven(self, state: SearchState) -> list[Proof]:
         """Return what is, or may be, too large in the required box, and look there too."""
         most = self.most
         if not self.is_given:
@@ -288,11 +292,11 @@ class StaticsDemand(Demand):
         """Return the values that are to be at most something, at the nodes of a box."""
 
     @abstractmethod
-    def _spares(self, state: State, positions: FloatArray) -> Measured:
+    def _spares(self, state: SearchState, positions: FloatArray) -> Measured:
         """Return what m parts have to spare at k positions, k · m values."""
 
     @abstractmethod
-    def _prove(self, state: State, most: float) -> list[Proof]:
+    def _prove(self, state: SearchState, most: float) -> list[Proof]:
         """Return the proofs that the values are at most something."""
 
 
@@ -303,7 +307,9 @@ class LoadDemand(StaticsDemand):
     share of a limit.
     """
 
-    def __init__(self, start: State, most: float | None = None, what: str = "load of") -> None:
+    def __init__(
+        self, start: SearchState, most: float | None = None, what: str = "load of"
+    ) -> None:
         limits = part_limits(start.design)
         self.limited = np.flatnonzero(np.isfinite(limits).any(axis=0))
         names = [f"{what} {PARTS[part]} over the required box" for part in self.limited.tolist()]
@@ -319,24 +325,24 @@ class LoadDemand(StaticsDemand):
         count = len(positions)
         return np.repeat(np.arange(count), len(self.limited)), np.tile(self.limited, count)
 
-    def _spares(self, state: State, positions: FloatArray) -> Measured:
+    def _spares(self, state: SearchState, positions: FloatArray) -> Measured:
         design, rotation, parts = state.design, state.rotation, self._rows(positions)
         twists = slopes.twist_slopes(design, positions, rotation)
         share, by = slopes.utilisation_slopes(design, rotation, twists, parts, self.limits)
         return _spare(share, by @ state.rows(CHAIN))
 
-    def _prove(self, state: State, most: float) -> list[Proof]:
+    def _prove(self, state: SearchState, most: float) -> list[Proof]:
         return prove_load(state.design, state.box, state.rotation, most=most)
 
 
 class AccelerationDemand(LoadDemand):
     """The largest acceleration from rest that each part allows, over the required box, in m/s²."""
 
-    def __init__(self, start: State, least: float) -> None:
+    def __init__(self, start: SearchState, least: float) -> None:
         super().__init__(start, 1.0, "acceleration by")
         self.least = least
 
-    def _spares(self, state: State, positions: FloatArray) -> Measured:
+    def _spares(self, state: SearchState, positions: FloatArray) -> Measured:
         """Return v − 1 for accelerations of v times the least one; 1 − 1/v where v exceeds 1."""
         parts = self._rows(positions)
         value, by = slopes.acceleration_slopes(state.design, positions, state.rotation, parts)
@@ -344,7 +350,7 @@ class AccelerationDemand(LoadDemand):
         above = np.maximum(1.0, value)
         return Measured(np.minimum(1.0, value) - 1.0 / above, by / (above**2)[:, None])
 
-    def _prove(self, state: State, most: float) -> list[Proof]:
+    def _prove(self, state: SearchState, most: float) -> list[Proof]:
         box, rotation = state.box, state.rotation
         return prove_load(state.design, box, rotation, most=most, acceleration=self.least)
 
@@ -352,7 +358,7 @@ class AccelerationDemand(LoadDemand):
 class DisplacementDemand(StaticsDemand):
     """The largest displacement of the tool by a cause over the required box, in design units."""
 
-    def __init__(self, start: State, cause: Cause, most: float | None = None) -> None:
+    def __init__(self, start: SearchState, cause: Cause, most: float | None = None) -> None:
         self.cause: Cause = cause
         super().__init__(start, most, [f"{cause} over the required box"])
 
@@ -360,7 +366,7 @@ class DisplacementDemand(StaticsDemand):
         """Return the displacements."""
         return box.errors.displacement if self.cause == "error" else box.deflections
 
-    def _spares(self, state: State, positions: FloatArray) -> Measured:
+    def _spares(self, state: SearchState, positions: FloatArray) -> Measured:
         design, rotation = state.design, state.rotation
         twists = slopes.twist_slopes(design, positions, rotation)
         if self.cause == "error":
@@ -369,12 +375,12 @@ class DisplacementDemand(StaticsDemand):
             largest, by = slopes.deflection_slopes(design, rotation, twists)
         return _spare(largest / self.most, by @ state.rows(CHAIN) / self.most)
 
-    def _prove(self, state: State, most: float) -> list[Proof]:
+    def _prove(self, state: SearchState, most: float) -> list[Proof]:
         prove = prove_error if self.cause == "error" else prove_deflection
         return prove(state.design, state.box, state.rotation, most)
 
 
-def _miss_beyond_plane(state: State, side: MarginDemand, count: int) -> Measured:
+def _miss_beyond_plane(state: SearchState, side: MarginDemand, count: int) -> Measured:
     """Return equal negative values, the less the deeper a box is beyond a singular plane."""
     value, gradient = side.measure(state)
     worst = int(value.argmin())
@@ -382,7 +388,7 @@ def _miss_beyond_plane(state: State, side: MarginDemand, count: int) -> Measured
     return Measured(np.full(count, value[worst] / BEYOND - 1.0), np.tile(slope, (count, 1)))
 
 
-def _scale_of(start: State, values: Callable[[BoxStatics], FloatArray]) -> float:
+def _scale_of(start: SearchState, values: Callable[[BoxStatics], FloatArray]) -> float:
     """Return the scale of a demand: the largest of values over the required box.
 
     If that is infinite, it is the value at the node, or at home, farthest from singular planes.

@@ -18,7 +18,7 @@ from explorer.measures.box import box_margins
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.problem import OF_THE_MACHINE, OVER_BOX, Problem
 from explorer.optimise.search import demands, grid_demands
-from explorer.optimise.search.state import NOWHERE, UNBOUNDED, State, bounds_of, scales
+from explorer.optimise.search.state import NOWHERE, UNBOUNDED, SearchState, bounds_of, scales
 from explorer.proofs.proof import Proof
 
 MISSED = 1e3
@@ -34,14 +34,14 @@ class Evaluation:
     """
 
     u: FloatArray
-    state: State
+    state: SearchState
     objective: float
     slope: FloatArray
     values: FloatArray
     gradients: FloatArray
 
 
-class Model:
+class SearchModel:
     """A problem from values of its variables to start from, ready for a solver.
 
     What is called before each evaluation may raise, to end the search. A relaxed problem leaves out
@@ -60,8 +60,8 @@ class Model:
         self.is_relaxed = is_relaxed
         self._before_each = before_each
         u = np.array(start) / scales(problem)
-        here = State(problem, u)
-        self.demands: list[demands.Demand] = _demands(problem, here)
+        here = SearchState(problem, u)
+        self.demands: list[demands.SearchDemand] = _demands(problem, here)
         clearance = problem.demands.clearance
         self._clearance: grid_demands.ClearanceDemand | None = None
         if clearance is not None:
@@ -130,7 +130,7 @@ class Model:
     def _evaluate(self, u: FloatArray) -> Evaluation:
         self._before_each()
         places = np.vstack([demand.places for demand in self.demands] or [NOWHERE])
-        state = State(self.problem, u[: len(self.problem.names)], places)
+        state = SearchState(self.problem, u[: len(self.problem.names)], places)
         if not np.isfinite(u).all():
             raise DesignError("the solver tried a design that is not finite")
         # A problem may demand nothing.
@@ -154,7 +154,7 @@ class Model:
             np.where(np.isfinite(rows), rows, 0.0),
         )
 
-    def _objective(self, state: State, u: FloatArray) -> tuple[float, FloatArray]:
+    def _objective(self, state: SearchState, u: FloatArray) -> tuple[float, FloatArray]:
         match self.problem.objective:
             case "match-volume":
                 # Each step is the smallest that meets the volume demand to first order.
@@ -193,7 +193,7 @@ class Model:
         return (spare, name) if spare <= max(least, -demands.MET) else (least, pair)
 
 
-def reported_objective(problem: Problem, state: State) -> float:
+def reported_objective(problem: Problem, state: SearchState) -> float:
     """Return the value that the objective of a problem is about, in its own unit.
 
     Loads, errors and deflections over a box on or across a singular plane are infinite.
@@ -216,9 +216,9 @@ def reported_objective(problem: Problem, state: State) -> float:
     return state.statics.worst(values)
 
 
-def _demands(problem: Problem, start: State) -> list[demands.Demand]:
+def _demands(problem: Problem, start: SearchState) -> list[demands.SearchDemand]:
     wanted = problem.demands
-    listed: list[demands.Demand] = []
+    listed: list[demands.SearchDemand] = []
     if wanted.volume is not None:
         exact = problem.objective == "match-volume"
         listed.append(demands.VolumeDemand(wanted.volume, is_equality=exact))
@@ -230,7 +230,7 @@ def _demands(problem: Problem, start: State) -> list[demands.Demand]:
         listed.append(demands.GapDemand(start))
     if wanted.required_box is not None:
         listed.append(demands.BoxDemand(start, wanted.tilt))
-    machine: list[demands.Demand] = []
+    machine: list[demands.SearchDemand] = []
     if wanted.held:
         machine.append(grid_demands.LoadDemand(start, 1.0))
     if wanted.error is not None:

@@ -28,10 +28,10 @@ from explorer.numerics.number_text import format_apart, format_number
 from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import OVER_BOX, Problem
 from explorer.optimise.search.demands import MET
-from explorer.optimise.search.model import Evaluation, Model, reported_objective
+from explorer.optimise.search.model import Evaluation, SearchModel, reported_objective
 from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimality, solve
 from explorer.optimise.search.starts import open_workspace, promising_starts
-from explorer.optimise.search.state import State, scales
+from explorer.optimise.search.state import SearchState, scales
 from explorer.proofs.proof import Proof
 from explorer.workspace.slices.volume import find_emptying_limits, unexplained_volume
 
@@ -135,17 +135,19 @@ class Search:
             if self._is_closed(u):
                 nearby = open_workspace(problem, u, see=self._see_opening)
                 if nearby is None:
-                    because = find_emptying_limits(State(problem, u).workspace.limits)
+                    because = find_emptying_limits(SearchState(problem, u).workspace.limits)
                     words = (
                         f"the workspace is empty because of {', '.join(because)}, and no "
                         "design nearby opens it"
                     )
                     return Attempt("infeasible", because[0] if because else "", words, trail.best)
                 values = (nearby * scales(problem)).tolist()
-            return self._solve(Model(problem, values, trail.before_each, is_relaxed=is_relaxed))
+            return self._solve(
+                SearchModel(problem, values, trail.before_each, is_relaxed=is_relaxed)
+            )
         except Stop:
             if not trail.history:
-                trail.see_opening(State(problem, np.array(values) / scales(problem)), "")
+                trail.see_opening(SearchState(problem, np.array(values) / scales(problem)), "")
             return Attempt("cancelled", "", "", trail.best)
 
     def _is_closed(self, u: FloatArray) -> bool:
@@ -153,16 +155,16 @@ class Search:
         if self.problem.objective in OVER_BOX and self.problem.demands.volume is None:
             return False
         demanded = self.problem.demands.volume or self.problem.size**3
-        return State(self.problem, u).volume < OPEN * demanded
+        return SearchState(self.problem, u).volume < OPEN * demanded
 
-    def _see_opening(self, state: State, worst: str) -> None:
+    def _see_opening(self, state: SearchState, worst: str) -> None:
         self.trail.before_each()
         self.steps += 1
         self.evaluations += 1
         self.steps_left -= 1
         self.trail.see_opening(state, worst)
 
-    def _solve(self, model: Model) -> Attempt:
+    def _solve(self, model: SearchModel) -> Attempt:
         at, missed, has_grown = model.at(model.start), list[Proof](), False
         is_done = False
         for _ in range(ROUNDS):
@@ -190,7 +192,7 @@ class Search:
                 larger = self._grow(model, at)
                 if larger is None:
                     break
-                model = Model(
+                model = SearchModel(
                     self.problem, larger, self.trail.before_each, is_relaxed=model.is_relaxed
                 )
                 at = model.at(model.start)
@@ -205,12 +207,12 @@ class Search:
         value, least = (self.trail.rank(iterate)[-1] for iterate in (optimum, self.to_beat))
         return value >= least - SAME * abs(least)
 
-    def _is_done(self, model: Model, at: Evaluation) -> bool:
+    def _is_done(self, model: SearchModel, at: Evaluation) -> bool:
         """Whether a place solves the problem, but for clearances between positions."""
         is_matched = self.problem.objective == "match-volume"
         return self._is_kept(model, at) and (is_matched or optimality(model, at).is_optimal)
 
-    def _may_end(self, model: Model, at: Evaluation) -> bool:
+    def _may_end(self, model: SearchModel, at: Evaluation) -> bool:
         """Whether the solver may end here: volume matched, or optimum that steps no longer change.
 
         The solver would wander on among designs that share the best objective.
@@ -228,7 +230,7 @@ class Search:
             and optimality(model, near, kinks=False).is_optimal
         )
 
-    def _is_kept(self, model: Model, at: Evaluation) -> bool:
+    def _is_kept(self, model: SearchModel, at: Evaluation) -> bool:
         """Whether all demands are met."""
         most = MATCHED if self.problem.objective == "match-volume" else math.inf
         # An infinite objective is no optimum.
@@ -239,19 +241,19 @@ class Search:
             and at.state.volume > unexplained_volume(at.state.workspace).error
         )
 
-    def _is_short(self, state: State) -> bool:
+    def _is_short(self, state: SearchState) -> bool:
         """Whether the volume is smaller than demanded."""
         return state.volume < (self.problem.demands.volume or 0.0) * (1.0 - MET)
 
-    def _grow(self, model: Model, at: Evaluation) -> list[float] | None:
+    def _grow(self, model: SearchModel, at: Evaluation) -> list[float] | None:
         """Return values with the demanded volume; None if it is out of reach."""
         demands = msgspec.structs.replace(self.problem.demands, volume=None)
         growing = msgspec.structs.replace(self.problem, objective="largest-volume", demands=demands)
         demanded = self.problem.demands.volume or 0.0
         values, is_relaxed = at.state.values.tolist(), model.is_relaxed
-        model = Model(growing, values, self.trail.before_each, is_relaxed=is_relaxed)
+        model = SearchModel(growing, values, self.trail.before_each, is_relaxed=is_relaxed)
 
-        def is_enough(model: Model, now: Evaluation) -> bool:
+        def is_enough(model: SearchModel, now: Evaluation) -> bool:
             return now.state.volume >= demanded and model.worst(now)[0] >= 0.0
 
         end = self._sqp(model, model.start, "growing", is_enough)
@@ -259,7 +261,7 @@ class Search:
             self.largest_volume = max(self.largest_volume, end.state.volume)
         return end.state.values.tolist() if is_enough(model, end) else None
 
-    def _feasible(self, model: Model, at: Evaluation) -> Evaluation:
+    def _feasible(self, model: SearchModel, at: Evaluation) -> Evaluation:
         """Return the nearest place that meets all demands if this one misses some by little."""
         before = model.evaluations
         near = nearest_feasible(model, at)
@@ -272,10 +274,10 @@ class Search:
 
     def _sqp(
         self,
-        model: Model,
+        model: SearchModel,
         u: FloatArray,
         phase: Phase,
-        is_enough: Callable[[Model, Evaluation], bool],
+        is_enough: Callable[[SearchModel, Evaluation], bool],
     ) -> Evaluation:
         def see(at: Evaluation) -> None:
             self.trail.see(model, at, phase)
@@ -297,7 +299,7 @@ class Search:
         return last
 
     def _verdict(
-        self, model: Model, at: Evaluation, missed: list[Proof], *, is_done: bool
+        self, model: SearchModel, at: Evaluation, missed: list[Proof], *, is_done: bool
     ) -> Attempt:
         """Return the result of an attempt from its last place.
 

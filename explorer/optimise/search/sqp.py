@@ -32,8 +32,8 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.outcome import Iterate, Phase
 from explorer.optimise.problem import Problem
 from explorer.optimise.search.demands import MET
-from explorer.optimise.search.model import MISSED, Evaluation, Model, reported_objective
-from explorer.optimise.search.state import State
+from explorer.optimise.search.model import MISSED, Evaluation, SearchModel, reported_objective
+from explorer.optimise.search.state import SearchState
 
 # SLSQP stops by itself once the objective changes by less than this.
 PRECISION = 1e-14
@@ -104,7 +104,7 @@ def slsqp(
 
 
 def solve(
-    model: Model, start: FloatArray, *, see: Callable[[Evaluation], None], most: int
+    model: SearchModel, start: FloatArray, *, see: Callable[[Evaluation], None], most: int
 ) -> tuple[Evaluation, int]:
     """Run SLSQP on a model from scaled variables, to the end or until `Stop` is raised.
 
@@ -169,21 +169,21 @@ class Trail:
         """Best iterate since `begin`; the last one of all if there is none."""
         return self._best or self.history[-1]
 
-    def last_at(self, state: State) -> Iterate:
+    def last_at(self, state: SearchState) -> Iterate:
         """Return the last iterate at a place that has been recorded."""
         values = tuple(state.values.tolist())
         return next(iterate for iterate in reversed(self.history) if iterate.values == values)
 
-    def see(self, model: Model, at: Evaluation, phase: Phase) -> None:
+    def see(self, model: SearchModel, at: Evaluation, phase: Phase) -> None:
         """Record an iterate of the solver."""
         spare, worst = model.worst_of_all(at)
         self._add(at.state, phase, worst, spare)
 
-    def see_opening(self, state: State, worst: str) -> None:
+    def see_opening(self, state: SearchState, worst: str) -> None:
         """Record an iterate on the way to a workspace that is not empty."""
         self._add(state, "opening", worst, 0.0 if state.volume > 0.0 else -1.0)
 
-    def _add(self, state: State, phase: Phase, worst: str, spare: float) -> None:
+    def _add(self, state: SearchState, phase: Phase, worst: str, spare: float) -> None:
         objective = reported_objective(self.problem, state)
         iterate = Iterate(
             number=len(self.history),
@@ -241,7 +241,7 @@ class Optimality(NamedTuple):
         return self.residual <= OPTIMAL
 
 
-def optimality(model: Model, at: Evaluation, *, kinks: bool = True) -> Optimality:
+def optimality(model: SearchModel, at: Evaluation, *, kinks: bool = True) -> Optimality:
     """Return how nearly a place that meets all demands is an optimum.
 
     To see an optimum in a kink takes many evaluations.
@@ -252,7 +252,7 @@ def optimality(model: Model, at: Evaluation, *, kinks: bool = True) -> Optimalit
     return min(smooth, _conditions(model, at, [at, *_sample_nearby(model, at)]))
 
 
-def _sample_nearby(model: Model, at: Evaluation) -> list[Evaluation]:
+def _sample_nearby(model: SearchModel, at: Evaluation) -> list[Evaluation]:
     """Return the problem at places close by, within the bounds."""
     lows, highs = model.bounds.T
     random = np.random.default_rng(0)
@@ -267,7 +267,7 @@ def _sample_nearby(model: Model, at: Evaluation) -> list[Evaluation]:
     return nearby
 
 
-def _conditions(model: Model, at: Evaluation, around: list[Evaluation]) -> Optimality:
+def _conditions(model: SearchModel, at: Evaluation, around: list[Evaluation]) -> Optimality:
     """Return how nearly the conditions hold with the gradients at some places."""
     from scipy.optimize import nnls
 
@@ -314,7 +314,7 @@ CONTRADICTION = 1e-9
 FAR = 1e3
 
 
-def nearest_feasible(model: Model, at: Evaluation) -> Evaluation | None:
+def nearest_feasible(model: SearchModel, at: Evaluation) -> Evaluation | None:
     """Return the nearest evaluation that meets all demands; None if no step leads to one."""
     lows, highs = model.bounds.T
     for _ in range(MOST_STEPS):
@@ -334,7 +334,7 @@ def nearest_feasible(model: Model, at: Evaluation) -> Evaluation | None:
     return at if model.worst(at)[0] >= 0.0 else None
 
 
-def _shortest(model: Model, at: Evaluation) -> FloatArray | None:
+def _shortest(model: SearchModel, at: Evaluation) -> FloatArray | None:
     """Return the shortest step that meets all demands and bounds to first order."""
     from scipy.optimize import nnls
 

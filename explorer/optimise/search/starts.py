@@ -15,9 +15,9 @@ from explorer.errors import DesignError, InputError
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import Problem, distances_of
 from explorer.optimise.search.demands import DegenerateDemand, GapDemand
-from explorer.optimise.search.model import MISSED, Model
+from explorer.optimise.search.model import MISSED, SearchModel
 from explorer.optimise.search.sqp import Point, slsqp
-from explorer.optimise.search.state import UNBOUNDED, State, bounds_of
+from explorer.optimise.search.state import UNBOUNDED, SearchState, bounds_of
 from explorer.workspace.limits.constraints import HalfSpace
 
 # Designs tried for each start, before the bounds are taken to allow no more.
@@ -67,7 +67,7 @@ def promising_starts(
     """
 
     def miss_of(values: tuple[float, ...]) -> float:
-        model = Model(problem, values, before_each)
+        model = SearchModel(problem, values, before_each)
         at = model.at(model.start)
         return float(np.abs(at.values[model.equalities]).sum()) - min(0.0, model.worst(at)[0])
 
@@ -85,13 +85,13 @@ MOST_ITERATIONS = 60
 
 
 def open_workspace(
-    problem: Problem, start: FloatArray, *, see: Callable[[State, str], None]
+    problem: Problem, start: FloatArray, *, see: Callable[[SearchState, str], None]
 ) -> FloatArray | None:
     """Return scaled variables at which a ball fits into the workspace, or None without success.
 
     Each iterate is seen with the limit that it breaks most.
     """
-    here, size, n = State(problem, start), problem.size, len(start)
+    here, size, n = SearchState(problem, start), problem.size, len(start)
     volume = problem.demands.volume
     radius = ROOM * (size if volume is None else volume ** (1.0 / 3.0))
     sides: list[DegenerateDemand | GapDemand] = []
@@ -105,7 +105,7 @@ def open_workspace(
     costs = np.concatenate([np.ones(n), np.full(3, COST_OF_PLACE)])
 
     def evaluate(x: FloatArray) -> Point:
-        state = State(problem, x[:n])
+        state = SearchState(problem, x[:n])
         # A limit that is not there is one that no position keeps.
         values, rows = np.full(len(labels), -MISSED), np.zeros((len(labels), len(x)))
         for index, name in enumerate(names):
@@ -123,7 +123,7 @@ def open_workspace(
 
     end = slsqp(
         evaluate,
-        lambda x, values: see(State(problem, x[:n]), labels[int(values.argmin())]),
+        lambda x, values: see(SearchState(problem, x[:n]), labels[int(values.argmin())]),
         first,
         np.vstack([bounds_of(problem), [UNBOUNDED] * 3]),
         np.zeros(len(labels), dtype=bool),
@@ -131,10 +131,10 @@ def open_workspace(
         precision=1e-8,
     )
     u = end[:n]
-    return u if State(problem, u).volume > 0.0 else None
+    return u if SearchState(problem, u).volume > 0.0 else None
 
 
-def _least_broken(state: State) -> FloatArray:
+def _least_broken(state: SearchState) -> FloatArray:
     """Return the position on a grid that breaks its limits the least, shape (3,)."""
     reach = state.longest_leg[0]
     lows, highs = state.design.limits.box or ((-reach,) * 3, (reach,) * 3)

@@ -43,7 +43,7 @@ NOWHERE = np.zeros((0, 3))
 """No places."""
 
 
-class State:
+class SearchState:
     """A problem at scaled variables (n,); each property is computed once.
 
     Loads, errors and deflections are evaluated at places in the required box too, as shares of its

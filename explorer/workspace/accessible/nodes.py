@@ -176,7 +176,7 @@ def survey(workspace: Workspace, grid: Grid) -> Survey:
     return Survey(workspace, grid, within, clearance, first, second, clear & ends_clear)
 
 
-class StartError(InputError):
+class InvalidStartError(InputError):
     """A start that breaks a limit or at which legs collide.
 
     Attributes:
@@ -190,7 +190,7 @@ class StartError(InputError):
 
 
 def check_start(workspace: Workspace, position: FloatArray) -> None:
-    """Raise a `StartError` unless a position (3,) keeps the limits and no legs collide there.
+    """Raise `InvalidStartError` unless a position (3,) keeps the limits and no legs collide.
 
     Its message names the limits or the pairs of legs, and the nearest valid position.
     """
@@ -207,7 +207,7 @@ def check_start(workspace: Workspace, position: FloatArray) -> None:
             remedy = f"the nearest valid position at this orientation is {place}"
         return f"no position is accessible from {_text_of(position, unit)}: {faults}; {remedy}"
 
-    raise StartError(words(None), nearest, words(workspace.design.millimetres))
+    raise InvalidStartError(words(None), nearest, words(workspace.design.millimetres))
 
 
 def _text_of(position: FloatArray, unit: Unit | None) -> str:

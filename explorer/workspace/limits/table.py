@@ -59,7 +59,7 @@ class Switch:
 
 
 @dataclass(frozen=True)
-class Entry:
+class LimitSlider:
     """A slider for a number or for the ends of a range.
 
     Attributes:
@@ -99,7 +99,7 @@ class Limit:
     path: str
     subjects: Mapping[str, str]
     demands: Callable[[LimitCase], Iterable[Demand]]
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[LimitSlider, ...] = ()
     switch: Switch | None = None
 
     def value(self, design: Design) -> Any:
@@ -107,7 +107,7 @@ class Limit:
         return attrgetter(self.path)(design.limits)
 
 
-Number = partial(Entry, is_number=True)
+Number = partial(LimitSlider, is_number=True)
 GAP, CARRIAGE_ORDER = "gap |d1 − d3|", "carriage order"
 
 
@@ -124,7 +124,7 @@ def _length(name: str) -> Limit:
 
     words = {"": "length", " minimum": "least length", " maximum": "greatest length"}
     subjects = {part: f"The {which} {name}" for part, which in words.items()}
-    entry = Entry(name, f"Minimum and maximum of {name}.", track, least=0.0)
+    entry = LimitSlider(name, f"Minimum and maximum of {name}.", track, least=0.0)
     return Limit(name, subjects, demands, (entry,), AT_REACH)
 
 
@@ -187,13 +187,13 @@ def _box(case: LimitCase) -> Iterator[Demand]:
             yield Demand(name, quantities.X + axis, *ends, symbol=f"b4 {letter}")
 
 
-def _box_entry(axis: int, name: str) -> Entry:
+def _box_entry(axis: int, name: str) -> LimitSlider:
     def track(design: Design) -> Pair:
         free = possible_ranges(design.with_limits(box=None)).position[axis]
         own = design.limits.box or ((free[0],) * 3, (free[1],) * 3)
         return min(free[0], own[0][axis]), max(free[1], own[1][axis])
 
-    return Entry(f"b4 {name}", f"The faces of the box across {name}.", track, axis)
+    return LimitSlider(f"b4 {name}", f"The faces of the box across {name}.", track, axis)
 
 
 def _margins(case: LimitCase) -> Iterator[Demand]:
@@ -247,7 +247,7 @@ LIMITS: list[Limit] = [
             " high": "The end of the guide, \u201cd most\u201d,",
         },
         _guide,
-        (Entry("d1, d3", "The ends of the guide, for both carriages.", _guide_track),),
+        (LimitSlider("d1, d3", "The ends of the guide, for both carriages.", _guide_track),),
         Switch("Bounded guide", "Keep both carriages between two ends of the guide."),
     ),
     Limit(

@@ -69,7 +69,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Frame:
+class TessellationFrame:
     """The frame in which workspaces are tessellated, and the tolerance.
 
     Attributes:
@@ -103,10 +103,12 @@ class Frame:
         return points * self.scale + self.middle
 
 
-def frame_around(lows: FloatArray, highs: FloatArray, tolerance: float) -> Frame:
+def frame_around(lows: FloatArray, highs: FloatArray, tolerance: float) -> TessellationFrame:
     """Return the frame around a box; all arguments are in design units."""
     middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
-    return Frame(middle, scale, tolerance, Box((lows - middle) / scale, (highs - middle) / scale))
+    return TessellationFrame(
+        middle, scale, tolerance, Box((lows - middle) / scale, (highs - middle) / scale)
+    )
 
 
 def step_of(radius: float, tolerance: float) -> float:

@@ -18,7 +18,7 @@ from explorer.errors import ExplorerError
 from explorer.numerics.arrays import FloatArray, IntArray, dot, triple
 from explorer.numerics.isosurface import surface_below_zero
 from explorer.workspace.limits.constraints import HalfSpace
-from explorer.workspace.solids.facets import Facets, Frame, frame_around
+from explorer.workspace.solids.facets import Facets, TessellationFrame, frame_around
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -220,7 +220,9 @@ def carved_solid(
     return replace(solid, limit_of_face=limit_of_face)
 
 
-def _below_zero(surface: Surface, frame: Frame, face_id: int, near: Manifold) -> Manifold:
+def _below_zero(
+    surface: Surface, frame: TessellationFrame, face_id: int, near: Manifold
+) -> Manifold:
     """Return the set below zero of a surface as a body in a frame, with one id for its faces.
 
     It is closed a little beyond the bounding box of the body that it is removed from.
@@ -297,7 +299,7 @@ def _in_order(faces: NDArray[np.int32]) -> NDArray[np.int32]:
     return turned[np.lexsort(turned.T[::-1])]
 
 
-def _body_of(solid: Solid) -> tuple[Manifold, Frame, dict[int, int]]:
+def _body_of(solid: Solid) -> tuple[Manifold, TessellationFrame, dict[int, int]]:
     """Return a mesh as a body, its frame, and the indices of limits by the ids of faces."""
     from manifold3d import Manifold
 
@@ -312,7 +314,7 @@ def _body_of(solid: Solid) -> tuple[Manifold, Frame, dict[int, int]]:
 
 
 def solid_of(
-    body: Manifold, origins: dict[int, int], frame: Frame, names: tuple[str, ...]
+    body: Manifold, origins: dict[int, int], frame: TessellationFrame, names: tuple[str, ...]
 ) -> Solid:
     """Return a body in a frame as a solid, with the indices of limits by the ids of faces."""
     vertices, faces, ids = mesh_of(body)

@@ -36,7 +36,7 @@ from explorer.workspace.slices.volume import (
     unexplained_volume,
 )
 from explorer.workspace.solids import facets
-from explorer.workspace.solids.facets import Box, Frame, frame_around
+from explorer.workspace.solids.facets import Box, TessellationFrame, frame_around
 from explorer.workspace.solids.solid import Solid, manifold_of, mesh_of, solid_of, union
 from explorer.workspace.workspace import Workspace
 
@@ -168,7 +168,7 @@ def _names(families: Sequence[Sequence[Constraint]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(limit.name for limits in families for limit in limits))
 
 
-def _make_solid(limits: Sequence[Constraint], frame: Frame) -> Solid:
+def _make_solid(limits: Sequence[Constraint], frame: TessellationFrame) -> Solid:
     """Return the positions that satisfy all limits as a mesh."""
     names = _names([limits])
     bodies, origins = _make_bodies([limits], frame, names)
@@ -176,7 +176,7 @@ def _make_solid(limits: Sequence[Constraint], frame: Frame) -> Solid:
 
 
 def _make_agreeing_solid(
-    limits: Sequence[Constraint], frame: Frame, exact: tuple[float, float]
+    limits: Sequence[Constraint], frame: TessellationFrame, exact: tuple[float, float]
 ) -> Solid:
     """Return a workspace as a mesh that agrees with the exact volume, if that is possible."""
     best = _make_solid(limits, frame)
@@ -209,7 +209,7 @@ def _make_agreeing_solid(
 
 
 def _make_bodies(
-    families: Sequence[Sequence[Constraint]], frame: Frame, names: tuple[str, ...]
+    families: Sequence[Sequence[Constraint]], frame: TessellationFrame, names: tuple[str, ...]
 ) -> tuple[list[Manifold], dict[int, int]]:
     """Return each family's workspace as a body, and the indices of names by the ids of faces."""
     from manifold3d import Manifold, OpType
@@ -259,7 +259,7 @@ class Primitive:
 
 def _frame_of(
     families: Sequence[Sequence[Constraint]], reach: float, tolerance: float | None
-) -> Frame:
+) -> TessellationFrame:
     """Return the frame for workspaces, given by the limits of each.
 
     The tolerance in design units is at most a quarter of the largest extent; if None, it is a 500th
@@ -279,7 +279,7 @@ def _frame_of(
     return frame_around(lows, highs, chord)
 
 
-def _primitives_of(limits: Sequence[Constraint], frame: Frame) -> list[Primitive]:
+def _primitives_of(limits: Sequence[Constraint], frame: TessellationFrame) -> list[Primitive]:
     """Return the primitives of a workspace: their intersection, less those that are cut.
 
     The list is empty if the boxes around the primitives already show that the workspace is.
@@ -308,7 +308,9 @@ def _primitives_of(limits: Sequence[Constraint], frame: Frame) -> list[Primitive
     return primitives
 
 
-def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Primitive | bool:
+def _half_space(
+    plane: HalfSpace, box: Box, block: Box, frame: TessellationFrame
+) -> Primitive | bool:
     """Return the primitive; True if the whole block satisfies it, False if the box violates it."""
     length = float(np.linalg.norm(plane.normal))
     normal = plane.normal / length
@@ -321,7 +323,7 @@ def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Primiti
 
 
 def _balls_and_cylinders(
-    limits: Sequence[BallOrCylinder], box: Box, block: Box, frame: Frame
+    limits: Sequence[BallOrCylinder], box: Box, block: Box, frame: TessellationFrame
 ) -> Iterator[Primitive | bool]:
     """Yield each primitive; True if the whole block satisfies it, False if the box violates it."""
     concentric: dict[tuple[bool, bytes], list[BallOrCylinder]] = {}
@@ -355,7 +357,7 @@ def _balls_and_cylinders(
             yield Primitive(limit.name, not limit.inside, faces, tessellate)
 
 
-def _cone(limit: Cone, frame: Frame) -> Primitive | bool:
+def _cone(limit: Cone, frame: TessellationFrame) -> Primitive | bool:
     """Return the primitive; True if all positions satisfy the limit, False if none does."""
     apex, axis, angle = frame.to_frame(limit.apex), limit.axis, limit.half_angle
     if limit.flat:

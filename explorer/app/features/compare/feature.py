@@ -12,7 +12,7 @@ import viser
 
 from explorer.app.features.compare.scene import SCENES
 from explorer.app.features.compare.state import SLOTS, Compared
-from explorer.app.features.compare.table import Column, bars, columns_of, notes, table
+from explorer.app.features.compare.table import ComparedDesign, bars, columns_of, notes, table
 from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
@@ -188,7 +188,7 @@ class ComparePanel:
                 )
 
     def _page(
-        self, state: State, columns: tuple[Column, ...], choices: Mapping[str, Design]
+        self, state: State, columns: tuple[ComparedDesign, ...], choices: Mapping[str, Design]
     ) -> str:
         look = Compared.of(state).look
         pins = _pin_buttons(state, choices)

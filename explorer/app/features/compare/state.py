@@ -16,7 +16,7 @@ Pinned: TypeAlias = tuple[Design | None, Design | None, Design | None]
 
 
 @dataclass(frozen=True)
-class Look:
+class CompareView:
     """How designs are compared.
 
     Attributes:
@@ -41,7 +41,7 @@ class Compared(FeaturePart, name="compared"):
     """
 
     pinned: Pinned = (None, None, None)
-    look: Look = Look()
+    look: CompareView = CompareView()
 
     @property
     def is_empty(self) -> bool:

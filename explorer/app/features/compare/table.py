@@ -56,7 +56,7 @@ LOADS = ("home_load_share", "home_largest_payload", "home_largest_bending", "hel
 
 
 @dataclass(frozen=True)
-class Column:
+class ComparedDesign:
     """A design in the comparison.
 
     Attributes:
@@ -103,9 +103,9 @@ class Column:
         return PER_CENT if measure.unit == "share" else measure.unit_in(self.unit, math.inf)
 
 
-def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[Column, ...]:
+def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[ComparedDesign, ...]:
     """Return the columns of the live design and of the pinned ones, given the feed of each."""
-    columns: list[Column] = []
+    columns: list[ComparedDesign] = []
     designs = (state.design, *Compared.of(state).pinned)
     for number, (design, feed) in enumerate(zip(designs, feeds, strict=True)):
         if design is not None:
@@ -114,11 +114,11 @@ def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[Column, ...]
             problem = feed.problem or (None if drawing is None else drawing.problem)
             ratio = design.unit_mm / state.design.unit_mm
             unit = Unit(state.unit.name, state.unit.factor * ratio)
-            columns.append(Column(number, design, measured, unit, feed.is_current, problem))
+            columns.append(ComparedDesign(number, design, measured, unit, feed.is_current, problem))
     return tuple(columns)
 
 
-def notes(state: State, columns: tuple[Column, ...]) -> list[str]:
+def notes(state: State, columns: tuple[ComparedDesign, ...]) -> list[str]:
     """Return remarks on a comparison: problems, empty workspaces, other units, as HTML."""
     remarks: list[str] = []
     live = state.design
@@ -176,7 +176,7 @@ def _hint_of(measure: Measure) -> str:
     return measure.hint if measure.sense is None else f"{measure.hint}; {measure.sense} is better"
 
 
-def table(columns: Sequence[Column]) -> str:
+def table(columns: Sequence[ComparedDesign]) -> str:
     """Return the table in HTML, a row for each measure; the live design is the first column."""
     head = "".join(_head(column) for column in columns)
     rows = "".join(
@@ -187,7 +187,7 @@ def table(columns: Sequence[Column]) -> str:
     return f'<table class="ex-compare"><tr><td class="ex-head"></td>{head}</tr>{rows}</table>'
 
 
-def _head(column: Column) -> str:
+def _head(column: ComparedDesign) -> str:
     name = escape(column.design.name)
     beside = '<span class="ex-dim ex-small">as it is</span>'
     if column.number != LIVE:
@@ -203,7 +203,7 @@ def _head(column: Column) -> str:
     )
 
 
-def _link(column: Column, act: str, words: str, hint: str) -> str:
+def _link(column: ComparedDesign, act: str, words: str, hint: str) -> str:
     return press_button(
         f"compare.{act}", column.letter, words, hint=hint, label=hint, class_name="ex-link"
     )
@@ -211,7 +211,7 @@ def _link(column: Column, act: str, words: str, hint: str) -> str:
 
 def measure_row(
     measure: Measure,
-    columns: Sequence[Column],
+    columns: Sequence[ComparedDesign],
     *,
     label: str = "",
     hint: str = "",
@@ -253,7 +253,7 @@ def measure_row(
     )
 
 
-def _cell(measure: Measure, column: Column, value: float | None, size: float) -> str:
+def _cell(measure: Measure, column: ComparedDesign, value: float | None, size: float) -> str:
     if column.measured is None:
         return "–" if column.problem is not None else "…"
     if measure.name == "volume" and not value:
@@ -263,7 +263,7 @@ def _cell(measure: Measure, column: Column, value: float | None, size: float) ->
     return value_text(measure, value, size)
 
 
-def _exact_text(measure: Measure, column: Column) -> str:
+def _exact_text(measure: Measure, column: ComparedDesign) -> str:
     """Return a value in the design's own units and in millimetres."""
     value = column.own_value(measure)
     if value is None:
@@ -276,7 +276,7 @@ def _exact_text(measure: Measure, column: Column) -> str:
     return " = ".join(unit.to_power(measure.power, size).text(value, 12) for unit in units)
 
 
-def bars(columns: Sequence[Column]) -> str:
+def bars(columns: Sequence[ComparedDesign]) -> str:
     """Return some of the measures as bars from zero, in HTML."""
     drawn = [CATALOGUE[name] for name in DRAWN]
     drawn += [
@@ -286,7 +286,7 @@ def bars(columns: Sequence[Column]) -> str:
     return f'<div class="ex-bars ex-small">{"".join(drawings)}</div>'
 
 
-def _drawing(measure: Measure, columns: Sequence[Column]) -> str:
+def _drawing(measure: Measure, columns: Sequence[ComparedDesign]) -> str:
     values = [column.value(measure) for column in columns]
     best, size = best_of(measure, values), _size_of(values)
     arrow = {"more": " ↑", "less": " ↓", None: ""}[measure.sense]

@@ -13,15 +13,15 @@ from html import escape
 
 import viser
 
-from explorer.app.features.feature import Export, Feature, Services, Tab
-from explorer.app.inputs.bindings import Bound
+from explorer.app.features.feature import Feature, FileExport, Services, Tab
+from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, MarkSaved, Open, SetName
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import open_geometry
 from explorer.app.state.view import View
-from explorer.app.storage.library import Entry, copy_name
+from explorer.app.storage.library import LibraryFile, copy_name
 from explorer.app.widgets.buttons import PressHandler, open_button, press_button
 from explorer.app.widgets.markup import box, note
 from explorer.errors import ExplorerError, InputError
@@ -61,7 +61,7 @@ class SavedDesigns:
         self._library = services.user_data.library
         self._session = services.session
         self._services = services
-        self.entries: tuple[Entry, ...] = ()
+        self.entries: tuple[LibraryFile, ...] = ()
         self.commands: tuple[Command, ...] = ()
         self.last_deleted: str | None = None
         self._requests: LatestWins[_Request] = LatestWins(self._do_all, "designs")
@@ -158,7 +158,7 @@ class SavedDesigns:
         self.last_deleted = self._library.last_deleted
         self._session.redraw()
 
-    def _command(self, entry: Entry) -> Command:
+    def _command(self, entry: LibraryFile) -> Command:
         return Command(
             f"Designs › Open {entry.name}",
             "Open this saved design.",
@@ -229,7 +229,7 @@ class DesignsPanel:
         self._controls.text(
             "Name",
             "Name of the live design, under which it is saved.",
-            Bound(lambda frame: frame.state.design.name, lambda _, name: SetName(name)),
+            ControlBinding(lambda frame: frame.state.design.name, lambda _, name: SetName(name)),
             disabled=lambda state: bool(state.busy),
         )
         actions: dict[str, Callable[[Who], None]] = {
@@ -306,17 +306,17 @@ class DesignsPanel:
         state = self._session.latest_state()
         self._saved.rename(state.base.name, state.design.name, who)
 
-    def _open(self, row: Entry, who: Who) -> None:
+    def _open(self, row: LibraryFile, who: Who) -> None:
         if row.name in PRESETS:
             self._session.do(partial(open_geometry, PRESETS[row.name]), who=who)
         else:
             self._saved.open(row.name, who)
 
-    def _duplicate(self, row: Entry, who: Who) -> None:
+    def _duplicate(self, row: LibraryFile, who: Who) -> None:
         if row.design is not None:
             self._saved.copy(row.design, who)
 
-    def _delete(self, row: Entry, who: Who) -> None:
+    def _delete(self, row: LibraryFile, who: Who) -> None:
         if row.name == self.asked:
             self._set_asked(None)
             self._saved.delete(row.name, who)
@@ -325,7 +325,7 @@ class DesignsPanel:
         self.asked = name if name not in PRESETS else None
         self._session.redraw()
 
-    def _for_row(self, action: Callable[[Entry, Who], None]) -> PressHandler:
+    def _for_row(self, action: Callable[[LibraryFile, Who], None]) -> PressHandler:
         def press(name: str, client: viser.ClientHandle) -> None:
             rows = rows_of(self._saved.entries)
             row = next((row for row in rows if row.name == name), None)
@@ -335,12 +335,12 @@ class DesignsPanel:
         return press
 
 
-def rows_of(entries: Sequence[Entry]) -> tuple[Entry, ...]:
+def rows_of(entries: Sequence[LibraryFile]) -> tuple[LibraryFile, ...]:
     """Return the rows of the list: the designs of the user, then the presets."""
-    return (*entries, *(Entry(name, "", design) for name, design in PRESETS.items()))
+    return (*entries, *(LibraryFile(name, "", design) for name, design in PRESETS.items()))
 
 
-def list_designs(rows: Sequence[Entry], current: str, asked: str | None, view: View) -> str:
+def list_designs(rows: Sequence[LibraryFile], current: str, asked: str | None, view: View) -> str:
     """Return the list in HTML, with the buttons of each row.
 
     The open design is marked; the row of the design asked for asks whether to delete it.
@@ -355,7 +355,7 @@ def list_designs(rows: Sequence[Entry], current: str, asked: str | None, view: V
     return box(head, f'<div class="ex-designs">{lines}</div>')
 
 
-def _line(row: Entry, view: View, *, is_current: bool, is_asked: bool) -> str:
+def _line(row: LibraryFile, view: View, *, is_current: bool, is_asked: bool) -> str:
     if row.design is None:
         problem = escape(row.problem or "")
         name = (
@@ -399,7 +399,7 @@ DESIGNS = Feature(
     "designs",
     tabs=(Tab("dialog", "Designs", DesignsPanel),),
     exports=(
-        Export(
+        FileExport(
             "Design",
             "A file to open again, here or with explorer --design.",
             ("JSON",),

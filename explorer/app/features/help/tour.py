@@ -48,7 +48,7 @@ BUTTONS = {
 
 
 @dataclass(frozen=True)
-class Step:
+class TourStep:
     """A step of the tour: a task of the user with instructions, at a tab of the controls.
 
     Attributes:
@@ -131,7 +131,7 @@ def _has_found(before: Frame, now: Frame) -> bool:
 
 
 STEPS = (
-    Step(
+    TourStep(
         "Move the platform",
         "Drag the handle at b4 in the scene, or the slider y. Legs and pose stay in step.",
         "Pose",
@@ -139,7 +139,7 @@ STEPS = (
         lambda before, now: before.state.pose != now.state.pose,
         lambda now: SetPosition(1, now.state.position[1] + STRIDE * now.state.design.reach),
     ),
-    Step(
+    TourStep(
         "Come close to a singularity",
         "Lower z. The two flags turn from blue to orange as they come close: where they meet, the "
         "mechanism is singular. Singularity, on the right, tells how far it is.",
@@ -149,7 +149,7 @@ STEPS = (
         _approach,
         after=GoHome(),
     ),
-    Step(
+    TourStep(
         "Change the design",
         "Move the slider a3x. The pose is held, and the legs and the workspace follow.",
         "Design",
@@ -157,7 +157,7 @@ STEPS = (
         lambda before, now: before.state.design.variables != now.state.design.variables,
         lambda now: SetVariable("a3x", GROWTH * now.state.design.variables[0]),
     ),
-    Step(
+    TourStep(
         "See the workspace",
         "Press Solid: all positions of b4 within the limits. Below it, cut the solid open, or "
         "colour it by the smallest margin.",
@@ -166,7 +166,7 @@ STEPS = (
         lambda _, now: now.state.view.workspace.solid,
         lambda _: Set("view.workspace.solid", True, "Solid"),
     ),
-    Step(
+    TourStep(
         "Optimise",
         "This is the initial design of the paper. Press Optimise: the search looks for a design "
         "whose workspace is as large as the paper asks for.",
@@ -193,7 +193,7 @@ class Tour:
     result: str = ""
 
     @property
-    def step(self) -> Step:
+    def step(self) -> TourStep:
         """The present step."""
         return STEPS[self.at]
 

@@ -18,7 +18,7 @@ from explorer.app.features.workspace.work import MeasuredVolume, Selection, meas
 from explorer.app.scene.placing import Placed, ScenePart, outline
 from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.session.feed import Feed, FeedOf
-from explorer.app.session.history import History, Step
+from explorer.app.session.history import History, HistoryStep
 from explorer.app.session.session import REDO, UNDO, move_to
 from explorer.app.state.actions import Action, Open
 from explorer.app.state.frame import Frame
@@ -91,7 +91,7 @@ class HistoryPanel:
             stamp, number = self._slider.update_timestamp, int(self._slider.value)
             self._session.post(self, move_to(number), stamp=stamp, who=event.client_id)
 
-    def _row(self, step: Step, here: Step) -> str:
+    def _row(self, step: HistoryStep, here: HistoryStep) -> str:
         """Return a step as a button in HTML; steps that were undone stay in the list."""
         look = "is-here" if step.number == here.number else ""
         by = author(self._services, step)
@@ -104,7 +104,7 @@ class HistoryPanel:
         )
 
 
-def author(services: Services, step: Step) -> str:
+def author(services: Services, step: HistoryStep) -> str:
     """Return words in HTML that only browsers show which have not done a step.
 
     They stand there while that one is connected, and another one too.

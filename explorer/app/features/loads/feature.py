@@ -16,7 +16,7 @@ from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEll
 from explorer.app.features.loads.scene import ForcesScene, LoadHandle
 from explorer.app.features.machine.actuators import FORCE, FORCES
 from explorer.app.features.machine.feature import MOMENT
-from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
@@ -56,7 +56,7 @@ class ForcesPanel:
                 "Force (N)",
                 "Force on the platform at the tool point, along x, y and z of the base; its arrow "
                 "in the scene can be dragged.",
-                Bound(
+                ControlBinding(
                     lambda frame: frame.state.view.forces.force,
                     lambda _, force: load.SetForce(force),
                 ),

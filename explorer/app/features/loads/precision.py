@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 
-from explorer.app.features.feature import Export, Services, html_of, show_html
+from explorer.app.features.feature import FileExport, Services, html_of, show_html
 from explorer.app.features.loads import budget as tasks
 from explorer.app.features.loads.load import Loads
 from explorer.app.features.optimise.work import requested_box
@@ -201,7 +201,7 @@ def _send_tolerances(services: Services, _: str, who: Who) -> None:
     services.downloads.compute(who, name, tasks.budget_table, (budget_request(state),))
 
 
-TOLERANCES = Export(
+TOLERANCES = FileExport(
     "Tolerances",
     "The dimensions by part, with their tolerances and what they cost at the tool.",
     ("CSV",),

@@ -11,7 +11,7 @@ from explorer.app.features.loads.load import Loads
 from explorer.app.features.loads.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.scene import shapes
-from explorer.app.scene.ellipsoid import Ellipsoid
+from explorer.app.scene.ellipsoid import EllipsoidNode
 from explorer.app.scene.placing import Placed, ScenePart, round_step
 from explorer.measures.blocks.precision import DIGITS
 from explorer.numerics.arrays import FloatArray
@@ -42,7 +42,7 @@ class ErrorEllipsoidScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         self._loads = services.get(Loads)
-        self._ellipsoid = Ellipsoid(services.scene, "/precision/ellipsoid")
+        self._ellipsoid = EllipsoidNode(services.scene, "/precision/ellipsoid")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ellipsoid of this frame."""

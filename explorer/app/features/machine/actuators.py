@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 import msgspec
 import viser
 
-from explorer.app.inputs.bindings import At, Bound, Source
+from explorer.app.inputs.bindings import At, ControlBinding, Source
 from explorer.app.inputs.bound import Condition
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import Action, Set
@@ -59,7 +59,7 @@ class MachineControls(Controls):
         def write(state: State, on: bool) -> Action:
             return Set(path, first(state) if on else None, label, "on" if on else "off")
 
-        is_on = Bound(lambda frame: value_at(frame.state, path) is not None, write)
+        is_on = ControlBinding(lambda frame: value_at(frame.state, path) is not None, write)
         self.checkbox(label, hint, is_on, disabled=lambda state: not is_possible(state))
 
     def limit(
@@ -81,7 +81,7 @@ class MachineControls(Controls):
         )
 
 
-class Quantity(NamedTuple):
+class ActuatorQuantity(NamedTuple):
     """A number that each of the six actuators has, by its name in `Actuators`.
 
     The meaning begins the sentence on it; where there is no start, it begins with the push.
@@ -109,17 +109,21 @@ class Quantity(NamedTuple):
         return self.given(state) or six or PUSH.given(state) or FORCES
 
 
-PUSH = Quantity("push_n", "push", "N", "Largest force that increases a joint's value", MEDIUM)
-PULL = Quantity("pull_n", "pull", "N", "Largest force that decreases it", MEDIUM)
-CONTINUOUS = Quantity(
+PUSH = ActuatorQuantity(
+    "push_n", "push", "N", "Largest force that increases a joint's value", MEDIUM
+)
+PULL = ActuatorQuantity("pull_n", "pull", "N", "Largest force that decreases it", MEDIUM)
+CONTINUOUS = ActuatorQuantity(
     "continuous_n", "continuous force", "N", "Largest root-mean-square force of a motion", MEDIUM
 )
-SPEED = Quantity("speed_mm_s", "speed", "mm/s", "Largest speed to either side", 1.0, 200.0)
-ACCELERATION = Quantity(
+SPEED = ActuatorQuantity("speed_mm_s", "speed", "mm/s", "Largest speed to either side", 1.0, 200.0)
+ACCELERATION = ActuatorQuantity(
     "acceleration_mm_s2", "acceleration", "mm/s²", "Largest acceleration either way", 10.0, 2000.0
 )
-ERROR = Quantity("error_mm", "error", "mm", "Largest positioning error to either side", FINE)
-STIFF = Quantity(
+ERROR = ActuatorQuantity(
+    "error_mm", "error", "mm", "Largest positioning error to either side", FINE
+)
+STIFF = ActuatorQuantity(
     "stiffness_n_mm", "stiffness", "N/mm", "Force along the joint per deflection", 1.0, STIFFNESS
 )
 
@@ -137,7 +141,7 @@ def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
     controls.checkbox(
         "Limited forces",
         "Limit the forces of the actuators; off, they push and pull without limit.",
-        Bound(lambda frame: _is_limited(frame.state), _limit_forces),
+        ControlBinding(lambda frame: _is_limited(frame.state), _limit_forces),
     )
     _add_common(controls, PUSH)
     controls.switch(
@@ -165,7 +169,7 @@ def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
                 )
 
 
-def _add_common(controls: MachineControls, quantity: Quantity) -> None:
+def _add_common(controls: MachineControls, quantity: ActuatorQuantity) -> None:
     # The number that counts for all six.
     extreme, word = (max, "largest") if quantity is ERROR else (min, "least")
     _add_field(
@@ -180,7 +184,7 @@ def _add_common(controls: MachineControls, quantity: Quantity) -> None:
 
 def _add_field(
     controls: MachineControls,
-    quantity: Quantity,
+    quantity: ActuatorQuantity,
     words: str,
     which: str,
     read: Callable[[Six], float],
@@ -195,7 +199,7 @@ def _add_field(
     controls.field(
         label,
         f"{quantity.meaning}, {which}.",
-        Bound(lambda frame: read(quantity.first(frame.state)), write),
+        ControlBinding(lambda frame: read(quantity.first(frame.state)), write),
         step=quantity.step,
         visible=lambda state: quantity.given(state) is not None,
     )

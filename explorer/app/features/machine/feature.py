@@ -14,7 +14,7 @@ import viser
 from explorer.app.features.feature import Feature, Services, Tab, show_html
 from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls, add_actuators
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
-from explorer.app.inputs.bindings import At, Bound, item
+from explorer.app.inputs.bindings import At, ControlBinding, item
 from explorer.app.inputs.ranges import Span, platform_span
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
@@ -116,7 +116,7 @@ class MachinePanel:
                 "Inertia (kg mm²)",
                 "Moments of inertia about the payload's centre along the platform's axes; they "
                 "count in motions only.",
-                Bound(lambda frame: self._inertia(frame.state), self._set_inertia),
+                ControlBinding(lambda frame: self._inertia(frame.state), self._set_inertia),
                 step=FINE,
             )
             self._no_body = gui.add_html("", visible=False)
@@ -180,7 +180,7 @@ class MachinePanel:
             "Gravity",
             "Direction of gravity along an axis of the base, for a machine on a wall or overhead.",
             (*DIRECTIONS, NO_OPTION),
-            Bound(
+            ControlBinding(
                 lambda frame: direction_name(frame.state.design.gravity) or NO_OPTION,
                 lambda state, name: Set(
                     "design.gravity", DIRECTIONS.get(name, state.design.gravity), "Gravity", name
@@ -191,7 +191,7 @@ class MachinePanel:
         self._controls.triple(
             "Direction",
             "Any other direction of gravity along the axes of the base; its length is kept at 1.",
-            Bound(
+            ControlBinding(
                 lambda frame: frame.state.design.gravity,
                 lambda _, direction: Set("design.gravity", direction, "Gravity"),
             ),
@@ -202,7 +202,7 @@ class MachinePanel:
         self._controls.checkbox(
             "Tubes",
             "Give the struts the size of a tube; off, they are rigid.",
-            Bound(lambda frame: _is_tube(frame.state), _make_tubes),
+            ControlBinding(lambda frame: _is_tube(frame.state), _make_tubes),
         )
         for label, hint, name in (
             ("Outer diameter (mm)", "Outer diameter of the tube.", "outer_mm"),
@@ -248,13 +248,13 @@ class MachinePanel:
         self._controls.field(
             EVERY_LENGTH,
             "Tolerance of all 21 lengths below; the field shows the largest of them.",
-            Bound(_largest_length, _set_lengths),
+            ControlBinding(_largest_length, _set_lengths),
             step=FINE,
         )
         self._controls.field(
             BOTH_TILTS,
             "Tolerance of both tilts of the guide through a1; the field shows the larger one.",
-            Bound(
+            ControlBinding(
                 lambda frame: max(frame.state.design.tolerances.guide_tilt_deg),
                 lambda _, value: Set(TILTS, (value, value), BOTH_TILTS, format_number(value, 6)),
             ),

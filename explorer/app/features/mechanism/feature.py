@@ -23,7 +23,7 @@ from explorer.app.features.mechanism.marks import DragHandle, Labels
 from explorer.app.features.mechanism.modes import MODES, Ghosts, ModesPanel
 from explorer.app.features.mechanism.sketch import sketch
 from explorer.app.inputs import ranges
-from explorer.app.inputs.bindings import Bound, item
+from explorer.app.inputs.bindings import ControlBinding, item
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.limits import bound_entry, bound_switch, limit_span
 from explorer.app.inputs.ranges import Intervals, Span
@@ -40,7 +40,7 @@ from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import NO_OPTION, Key, shift
-from explorer.workspace.limits.table import LIMITS, Entry, Limit, Switch
+from explorer.workspace.limits.table import LIMITS, Limit, LimitSlider, Switch
 
 JOINT_HINTS = {
     "l1  leg 1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
@@ -219,7 +219,7 @@ class DesignPanel:
                 "Open one of the designs of the paper's Table 1, in its home pose. The machine, "
                 "the radii of the legs, and what is asked and shown stay.",
                 (*PRESETS, NO_OPTION),
-                Bound(
+                ControlBinding(
                     lambda frame: preset_of(frame.state.design) or NO_OPTION,
                     lambda state, name: open_geometry(PRESETS.get(name, state.design), state),
                 ),
@@ -244,7 +244,7 @@ class DesignPanel:
                 controls.slider(
                     name,
                     VARIABLE_HINTS[name],
-                    Bound(
+                    ControlBinding(
                         lambda frame, index=index: frame.state.design.variables[index],
                         lambda _, value, name=name: geometry.SetVariable(name, value),
                     ),
@@ -255,7 +255,7 @@ class DesignPanel:
                 "1 unit (mm)",
                 "Millimetres in one design unit: variables, limits and home grow with it. The "
                 "machine, the radii of the legs, and what is asked keep their millimetres.",
-                Bound(lambda frame: frame.state.design.unit_mm, set_unit),
+                ControlBinding(lambda frame: frame.state.design.unit_mm, set_unit),
                 least=1e-6,
                 step=0.001,
             )
@@ -298,7 +298,7 @@ class DesignPanel:
             for entry in limit.entries:
                 self._add_entry(limit, entry)
 
-    def _add_entry(self, limit: Limit, entry: Entry) -> None:
+    def _add_entry(self, limit: Limit, entry: LimitSlider) -> None:
         add = self._controls.slider if entry.is_number else self._controls.ends
         add(
             entry.label,

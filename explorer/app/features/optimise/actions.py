@@ -149,7 +149,7 @@ class CancelRun(Action):
 
 
 @dataclass(frozen=True)
-class Advance(Action):
+class AddIterates(Action):
     """Add iterates to a run, and draw the last one."""
 
     continues: ClassVar[bool] = True
@@ -181,7 +181,7 @@ class EndRun(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        state = Advance(self.number, self.iterates).apply(state)
+        state = AddIterates(self.number, self.iterates).apply(state)
         run = _running(state, self.number)
         if run is None:
             return state

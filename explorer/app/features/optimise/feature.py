@@ -21,7 +21,7 @@ from explorer.app.features.optimise.state import PLACE, Optimisation, Optimisati
 from explorer.app.features.optimise.words import goal_unit, result_words, search_notice
 from explorer.app.features.optimise.work import complete_request, requested_box
 from explorer.app.features.prototype.building import BuildVerdict
-from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import GHOST, add_lines
@@ -128,7 +128,7 @@ class OptimisePanel:
         controls.checkbox(
             "Required box",
             "Demand that a box lies within the workspace; it is drawn.",
-            Bound(
+            ControlBinding(
                 lambda frame: _request(frame.state).needs_box,
                 lambda _, on: SetRequest("optimisation.request.with_box", on, "Required box"),
             ),
@@ -201,7 +201,7 @@ class OptimisePanel:
         self._controls.triple(
             label,
             "A corner of the box, in the base frame.",
-            Bound(lambda frame: requested_box(frame.state)[end], write),
+            ControlBinding(lambda frame: requested_box(frame.state)[end], write),
             step=STEP,
             power=1,
             visible=lambda state: _request(state).needs_box,
@@ -217,7 +217,7 @@ class OptimisePanel:
         self._controls.checkbox(
             FREE_LABELS.get(name, name),
             hint,
-            Bound(lambda frame: name in _request(frame.state).free, write),
+            ControlBinding(lambda frame: name in _request(frame.state).free, write),
             disabled=lambda state: name == PLACE and not _request(state).needs_box,
         )
 

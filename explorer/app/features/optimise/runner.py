@@ -11,7 +11,7 @@ import threading
 import time
 
 from explorer.app.features.feature import Runner, Services
-from explorer.app.features.optimise.actions import Advance, CancelRun, Compare, EndRun
+from explorer.app.features.optimise.actions import AddIterates, CancelRun, Compare, EndRun
 from explorer.app.features.optimise.state import REACHED, Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import optimise
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
@@ -146,7 +146,7 @@ class Optimiser(Runner):
             taken = count if is_over else math.ceil((len(run.iterates) + count) / STEPS)
             iterates, self._waiting = tuple(self._waiting[:taken]), self._waiting[taken:]
             if not is_over or self._ending is None:
-                return Advance(run.number, iterates)
+                return AddIterates(run.number, iterates)
             self._number = 0
             result = result_of(run, self._ending, run.iterates + iterates)
             return EndRun(run.number, result, iterates)

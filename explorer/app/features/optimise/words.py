@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from explorer.app.features.compare.table import Column, measure_row
+from explorer.app.features.compare.table import ComparedDesign, measure_row
 from explorer.app.features.optimise import buttons, work
 from explorer.app.features.optimise.actions import LiftLimit
 from explorer.app.features.optimise.state import REACHED, Optimisation, SearchResult, SearchRun
@@ -208,7 +208,7 @@ def comparison_table(run: SearchRun, view: View) -> str:
     if run.comparison is None:
         return markup.dim("Comparing …")
     columns = [
-        Column(number, each.design, each, view.unit_for(each.design))
+        ComparedDesign(number, each.design, each, view.unit_for(each.design))
         for number, each in enumerate(run.comparison)
     ]
     rows = [
@@ -223,7 +223,7 @@ def comparison_table(run: SearchRun, view: View) -> str:
     return f'<table class="ex-compare"><tr class="ex-dim">{head}</tr>{"".join(rows)}</table>'
 
 
-def _comparison_row(problem: problems.Problem, name: str, columns: Sequence[Column]) -> str:
+def _comparison_row(problem: problems.Problem, name: str, columns: Sequence[ComparedDesign]) -> str:
     measure, after = CATALOGUE[name], columns[-1].measured
     label, hint = measure.label, measure.hint
     pairs: dict[str, tuple[int, int] | None] = {}

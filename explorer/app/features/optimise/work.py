@@ -92,7 +92,7 @@ def _find_refusals(
     try:
         problem = _problem(design, request)
     except ExplorerError as error:
-        limit = error.limit if isinstance(error, problems.StartError) else ""
+        limit = error.limit if isinstance(error, problems.DesignStartError) else ""
         return (conflicts.Conflict(limit, str(error)),)
     return conflicts.find_conflicts(problem, unit)
 

@@ -171,7 +171,7 @@ class Play(Action):
 
 
 @dataclass(frozen=True)
-class Advance(Action):
+class AdvanceJourney(Action):
     """Advance a path that is playing by some seconds, until its end."""
 
     continues: ClassVar[bool] = True

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, Tab, show
-from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
+from explorer.app.features.paths.actions import AdvanceJourney, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
 from explorer.app.features.paths.work import DRIVES_FEED
@@ -141,10 +141,10 @@ class PathRunner(Runner):
             self._session.post(self, self._advance)
         return self._is_playing
 
-    def _advance(self, _: State) -> Advance:
+    def _advance(self, _: State) -> AdvanceJourney:
         now = time.monotonic()
         passed, self._advanced_at = min(now - self._advanced_at, LONGEST_STEP), now
-        return Advance(passed)
+        return AdvanceJourney(passed)
 
 
 PATHS = Feature(

@@ -12,7 +12,7 @@ from explorer.app.features.feature import Services, show_html
 from explorer.app.features.paths import actions, plots
 from explorer.app.features.paths.drives import DrivesPanel
 from explorer.app.features.paths.state import End, PathKind, Paths, journey_of
-from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.state.actions import Action, Set
@@ -118,7 +118,7 @@ class PathsPanel:
                 "Time (s)",
                 "Time on the path. A straight path takes 8 s; on a planned one the fastest "
                 "actuator moves a tenth of the reach per second.",
-                Bound(_time_played, lambda _, value: actions.SetPathTime(value)),
+                ControlBinding(_time_played, lambda _, value: actions.SetPathTime(value)),
                 _time_span,
                 disabled=lambda state: journey_of(state) is None,
             )
@@ -178,7 +178,7 @@ class PathsPanel:
             title,
             HINTS[end],
             OPTIONS[end],
-            Bound(
+            ControlBinding(
                 lambda frame: _option(frame.state, end),
                 lambda state, chosen: _choose(state, end, chosen),
             ),
@@ -193,7 +193,7 @@ class PathsPanel:
             self._controls.triple(
                 f"{title} {words}",
                 hint,
-                Bound(
+                ControlBinding(
                     lambda frame, index=index: typed_numbers(frame.state, end)[index],
                     lambda state, triple, index=index: _set_typed(state, end, index, triple),
                 ),

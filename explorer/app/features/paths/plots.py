@@ -152,7 +152,7 @@ def demand_note(state: State) -> str:
     return note("No part has a limit, so every load is held: see the tab Machine.")
 
 
-class Quantity(NamedTuple):
+class ChartQuantity(NamedTuple):
     """A number of each incidence that a chart shows.
 
     Attributes:
@@ -174,17 +174,17 @@ def fold_magnitudes(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     return np.degrees(np.abs(to_folds(position, rotation)[..., 3:]))
 
 
-def margins_in(unit: Unit) -> Quantity:
+def margins_in(unit: Unit) -> ChartQuantity:
     """Return the margins in a unit of lengths."""
 
     def values(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         return unit.factor * margins(position, rotation)
 
     vertical = axis("margin δ", label_size=18, size=40, space=18)
-    return Quantity("δ{}", vertical, (0.0,), 2, f" {unit.name}", values)
+    return ChartQuantity("δ{}", vertical, (0.0,), 2, f" {unit.name}", values)
 
 
-FOLDS = Quantity(
+FOLDS = ChartQuantity(
     "|φ{}|",
     axis("fold |φ| (°)", label_size=18, size=40) | {"splits": (0.0, 90.0, 180.0)},
     (0.0, 180.0),
@@ -200,7 +200,7 @@ class IncidencePlot:
     def __init__(
         self,
         gui: viser.GuiApi,
-        quantity_in: Callable[[Unit], Quantity],
+        quantity_in: Callable[[Unit], ChartQuantity],
         *,
         has_times: bool = True,
     ) -> None:
@@ -227,7 +227,7 @@ class IncidencePlot:
         yield from show_html(self._legend, words)
 
 
-def incidence_columns(journey: Journey | None, quantity: Quantity) -> tuple[NDArray[Any], ...]:
+def incidence_columns(journey: Journey | None, quantity: ChartQuantity) -> tuple[NDArray[Any], ...]:
     """Return the columns of the chart: time, the three values, singular poses, present time."""
     if journey is None:
         return blank_columns(4, span_of(quantity.flat))
@@ -262,7 +262,7 @@ def crossing_time(journey: Journey, index: int) -> float:
     return float(np.interp(crossing.move + crossing.share, trajectory.at, trajectory.time))
 
 
-def legend(pose: Pose, quantity: Quantity) -> str:
+def legend(pose: Pose, quantity: ChartQuantity) -> str:
     """Return the lines of the chart with the values of a pose, in one line of HTML."""
     values = quantity.of(pose.position, pose.rotation).tolist()
     parts = (

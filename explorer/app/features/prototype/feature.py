@@ -7,12 +7,12 @@ from html import escape
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Export, Feature, InBar, Services, Tab, show_html
+from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab, show_html
 from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype import work
 from explorer.app.features.prototype.building import BUILD_FEED, BuildVerdict, strokes_table
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, PartsFeed, parts_to_draw
-from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
@@ -63,7 +63,7 @@ class PrototypePanel:
             "Show the parts",
             "Draw the mechanism as parts that can be made: sized from the design, the radii of "
             "its legs and its unit.",
-            Bound(
+            ControlBinding(
                 lambda frame: frame.state.view.drawn_as == "prototype",
                 lambda _, on: draw_as("prototype" if on else "schematic"),
             ),
@@ -267,13 +267,13 @@ PROTOTYPE = Feature(
     tabs=(Tab("analyse", "Prototype", PrototypePanel, viser.Icon.ENGINE),),
     bar=(InBar("middle", lambda services: services.get(BuildVerdict).in_bar),),
     exports=(
-        Export(
+        FileExport(
             "Mechanism",
             "Parts that can be made, assembled in the home pose, in millimetres.",
             tuple(ASSEMBLIES),
             _send_assembly,
         ),
-        Export(
+        FileExport(
             "Simulation",
             "A model for MuJoCo and other engines, with servos that bear the weights at home.",
             ("MJCF",),

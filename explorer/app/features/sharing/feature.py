@@ -10,7 +10,7 @@ from html import escape
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
+from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
 from explorer.app.features.optimise.state import Optimisation
 from explorer.app.features.paths.work import request_for
 from explorer.app.features.prototype.building import BuildVerdict
@@ -188,7 +188,7 @@ class ExportDialog:
             yield self._list, "content", box("".join(rows))
 
 
-def _row(export: Export, is_ready: bool) -> str:
+def _row(export: FileExport, is_ready: bool) -> str:
     """Return a thing and the buttons of its formats, as HTML."""
     buttons = "".join(
         extra_button(EXTRA_OF_FORMAT[name])
@@ -222,19 +222,19 @@ SHARING = Feature(
     tabs=(Tab("dialog", "Export", ExportDialog),),
     bar=(InBar("right", lambda _: export_button),),
     exports=(
-        Export(
+        FileExport(
             "Report",
             "The design in its pose on a few pages: drawings, slices, tables, limits.",
             tuple(REPORTS),
             lambda services, name, who: send_report(services, REPORTS[name], who),
         ),
-        Export(
+        FileExport(
             "Picture",
             "The scene with its labels, from your camera.",
             tuple(PICTURES),
             lambda services, name, who: send_picture(services, PICTURES[name], who),
         ),
-        Export(
+        FileExport(
             "Figure",
             "The mechanism from your camera for a paper, as wide as a column or a page.",
             tuple(FIGURES),
@@ -242,25 +242,25 @@ SHARING = Feature(
                 services, FIGURES[name][0], who, black=FIGURES[name][1]
             ),
         ),
-        Export(
+        FileExport(
             "Scene",
             "One file to turn and zoom in any browser, without network.",
             ("HTML",),
             lambda services, _, who: send_scene(services, who),
         ),
-        Export(
+        FileExport(
             "Moving page",
             "A small file with sliders in which the mechanism moves, for lessons and papers.",
             ("HTML",),
             sender_of("-moving.html", moving_page),
         ),
-        Export(
+        FileExport(
             "Kernel for controllers",
             "Kinematics and limits of the design as C99 source, in millimetres.",
             ("C (zip)",),
             sender_of("-kernel.zip", lambda design: zip_bytes(kernel_files(design))),
         ),
-        Export(
+        FileExport(
             "Configuration for LinuxCNC",
             "Kinematics, limits and home of the design, to run in simulation at first.",
             ("INI (zip)",),

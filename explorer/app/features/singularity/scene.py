@@ -11,7 +11,7 @@ import viser
 from explorer.app.features.feature import Services, show
 from explorer.app.features.mechanism import bodies
 from explorer.app.scene import shapes
-from explorer.app.scene.ellipsoid import Ellipsoid
+from explorer.app.scene.ellipsoid import EllipsoidNode
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -106,7 +106,7 @@ class EllipsoidScene(ScenePart):
     """The ellipsoid of velocities, or of forces, of unit actuators at b4 or at the tool point."""
 
     def __init__(self, services: Services) -> None:
-        self._ellipsoid = Ellipsoid(services.scene, "/ellipsoid")
+        self._ellipsoid = EllipsoidNode(services.scene, "/ellipsoid")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ellipsoid of this frame."""

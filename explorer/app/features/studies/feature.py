@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
+from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.figures import PlotName, brushes_in, reading_of, row_at
 from explorer.app.features.studies.folders import keep_study, study_folders
@@ -27,7 +27,7 @@ from explorer.app.features.studies.state import (
 )
 from explorer.app.features.studies.words import BUTTONS, acts, chips, head, legend, table
 from explorer.app.features.studies.work import study_feed, study_runner
-from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.bound import Control
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
@@ -111,7 +111,7 @@ class StudiesPanel:
         self._control = Control[str](
             session,
             self.choice,
-            Bound(
+            ControlBinding(
                 lambda frame: Studies.of(frame.state).name or NO_OPTION,
                 lambda _, name: OpenStudy(None if name == NO_OPTION else name),
             ),
@@ -212,7 +212,7 @@ class StudiesPanel:
             elif row is not None:
                 self.pick(int(plotted.results.columns["index"][row]), who)
 
-    def _bind_axis(self, axis: Axis) -> Bound[str]:
+    def _bind_axis(self, axis: Axis) -> ControlBinding[str]:
         def read(_: Frame) -> str:
             plotted = None if self.feed.drawing is None else self.feed.drawing.plotted
             return NO_OPTION if plotted is None else str(getattr(plotted, axis))
@@ -221,7 +221,7 @@ class StudiesPanel:
             path, label = f"studies.{axis}", AXES[axis][0]
             return Set(path, None if name == NO_OPTION else name, label, label_of(name))
 
-        return Bound(read, write)
+        return ControlBinding(read, write)
 
     def _add_new_study(self, services: Services) -> None:
         gui = services.gui
@@ -346,7 +346,7 @@ STUDIES = Feature(
     bar=(InBar("right", StudyChip),),
     later_feeds=(study_feed,),
     exports=(
-        Export(
+        FileExport(
             "Study",
             "The table of the study that is open in the tab Studies, a line for each design.",
             ("CSV", "Parquet"),

@@ -10,11 +10,11 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.features.feature import Export, Feature, InBar, Services, Tab, show_html
+from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab, show_html
 from explorer.app.features.workspace import feeds, words as texts, work
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
-from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span, coordinate_span, fine_step, round_up
 from explorer.app.scene.surfaces import Measure
@@ -91,7 +91,7 @@ class WorkspacePanel:
             "to, from home or from the present position, or those at which the load of the tab "
             "Loads is held.",
             REGIONS,
-            Bound(_region, _set_region),
+            ControlBinding(_region, _set_region),
             is_in_palette=True,
         )
         self._under_way = UnderWay(services, "workspace", self._feed)
@@ -125,7 +125,7 @@ class WorkspacePanel:
         controls.slider(
             "Cut at ({unit})",
             "Position of the cutting plane on its axis.",
-            Bound(
+            ControlBinding(
                 lambda frame: self._level(frame.state),
                 lambda _, value: Set("view.workspace.level", value, "Cut at"),
             ),
@@ -321,7 +321,7 @@ WORKSPACE = Feature(
     tabs=(Tab("analyse", "Workspace", WorkspacePanel, viser.Icon.SPHERE),),
     bar=(InBar("middle", volume_figure),),
     exports=(
-        Export(
+        FileExport(
             "Workspace",
             "All positions of b4, or of the tool point if the tab Pose shows it, in the region and "
             "orientation of the tab Workspace; STEP has exact faces.",
@@ -330,7 +330,7 @@ WORKSPACE = Feature(
                 services, "workspace", name.lower(), who
             ),
         ),
-        Export(
+        FileExport(
             "Convex hull",
             "The convex hull of that workspace.",
             tuple(map(str.upper, feeds.HULL_FORMATS)),

@@ -23,7 +23,7 @@ from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_apart, format_number
 from explorer.numerics.search import Watch, ignore_stage
 from explorer.statics.reactions import has_limits
-from explorer.workspace.accessible.nodes import StartError
+from explorer.workspace.accessible.nodes import InvalidStartError
 from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
 from explorer.workspace.accessible.workspace import PairCost, accessible_part
 from explorer.workspace.carried_region import carried_region
@@ -88,7 +88,7 @@ class Selection:
 
 
 @dataclass(frozen=True)
-class Part:
+class PartVolume:
     """The volume of a part of a workspace, and of an accessible one what legs block.
 
     Attributes:
@@ -111,12 +111,14 @@ class Trouble:
 
 def trouble_of(error: ExplorerError) -> Trouble:
     """Return an error of the library as a trouble."""
-    if not isinstance(error, StartError):
+    if not isinstance(error, InvalidStartError):
         return Trouble(str(error))
     return Trouble(error.in_millimetres, None if error.nearest is None else triple(error.nearest))
 
 
-def find_part(selection: Selection, tolerance: float, watch: Watch) -> tuple[Part, Solid] | Trouble:
+def find_part(
+    selection: Selection, tolerance: float, watch: Watch
+) -> tuple[PartVolume, Solid] | Trouble:
     """Return the part of a workspace that a region names, "accessible" or "held", or its trouble.
 
     The tolerance is that of chords; `watch` gets each stage.
@@ -128,7 +130,7 @@ def find_part(selection: Selection, tolerance: float, watch: Watch) -> tuple[Par
 
 def _find_accessible(
     selection: Selection, tolerance: float, watch: Watch
-) -> tuple[Part, Solid] | Trouble:
+) -> tuple[PartVolume, Solid] | Trouble:
     try:
         accessible = accessible_part(
             selection.workspace,
@@ -140,13 +142,13 @@ def _find_accessible(
     except ExplorerError as error:
         return trouble_of(error)
     nodes = accessible.accessible_node_count
-    return Part(accessible.accessible_volume, nodes, accessible.pairs), accessible.solid
+    return PartVolume(accessible.accessible_volume, nodes, accessible.pairs), accessible.solid
 
 
-def _find_carried(selection: Selection, tolerance: float) -> tuple[Part, Solid] | Trouble:
+def _find_carried(selection: Selection, tolerance: float) -> tuple[PartVolume, Solid] | Trouble:
     region = carried_region(selection.workspace, selection.load, tolerance=tolerance)
     if region.volume == 0.0 or not region.solid.is_empty:
-        return Part(region.held_volume), region.solid
+        return PartVolume(region.held_volume), region.solid
     # Without a factor columns find a volume.
     if region.factor is None or region.factor >= 1.0:
         return Trouble("the positions that hold it are too few to be drawn")
@@ -228,7 +230,7 @@ class WorkspaceDrawing:
     hull: Shell | None
     slice_map: maps.SliceMap | None
     volume: float
-    part: Part | None
+    part: PartVolume | None
     trouble: Trouble | None
     mesh_volume: float
     mesh_agrees: bool | None
