@@ -9,6 +9,7 @@ in millimetres.
 
 from __future__ import annotations
 
+import itertools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -171,12 +172,6 @@ def outline(snapshot: Snapshot) -> FloatArray:
     # The part of the guide between a1 and the carriages.
     low, high = np.array([[min(0.0, d1, d3), 0.0, 0.0], [max(0.0, d1, d3), 0.0, 0.0]])
     base = ((low, high), (points.a1, points.a3), (high, points.a3))
-    legs = (
-        (points.a1, points.b1),
-        (first, points.b2),
-        (second, points.b3),
-        (points.a3, points.b4),
-    )
     corners = (points.b1, points.b2, points.b3, points.b4)
-    platform = tuple((a, b) for index, a in enumerate(corners) for b in corners[index + 1 :])
-    return np.array([*base, *legs, *platform])
+    legs = zip((points.a1, first, second, points.a3), corners, strict=True)
+    return np.array([*base, *legs, *itertools.combinations(corners, 2)])

@@ -182,11 +182,11 @@ def cut_to_size(
 ) -> tuple[FloatArray, IntArray]:
     """Return vertices (n, 3) and triangles (m, 3) of a surface, cut until their edges are short.
 
-    The longest edge to aim at is in design units. A surface that is large beside it keeps longer
-    ones: halving goes on only as long as it makes at most `MOST_COLOURED` triangles.
+    Halving goes on only as long as it makes at most `MOST_COLOURED` triangles.
     """
     while True:
-        lengths = edge_lengths(vertices, triangles)
+        ends = vertices[triangles]
+        lengths = np.linalg.norm(ends - np.roll(ends, -1, axis=1), axis=2)
         longest = float(lengths.max())
         shorter = max(edge, 0.5 * longest)
         # Each edge that is cut divides both triangles beside it in two.
@@ -197,12 +197,6 @@ def cut_to_size(
         untyped: Any = remesh
         subdivided = untyped.subdivide_to_size(vertices, triangles, shorter, max_iter=12)
         vertices, triangles = np.asarray(subdivided[0], dtype=np.float64), np.asarray(subdivided[1])
-
-
-def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the lengths of the three edges of each face, shape (m, 3)."""
-    ends = vertices[faces]
-    return np.linalg.norm(ends - np.roll(ends, -1, axis=1), axis=2)
 
 
 def _by_cause(faces: Faces) -> tuple[Shell, ...]:

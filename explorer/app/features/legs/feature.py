@@ -155,10 +155,7 @@ def volume_at(curve: RadiusCurve, radius: float | FloatArray) -> FloatArray:
 
 
 def chart_columns(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]:
-    """Return the columns of the chart: radii, volumes, and the three marks.
-
-    Beyond the last radius the volume is 0.
-    """
+    """Return the columns of the chart: radii, volumes, and the three marks."""
     marks = marked_radii(curve, radius)
     marked = [mark for mark in marks if mark is not None]
     last = float(curve.radii[-1])

@@ -81,9 +81,9 @@ class Bodies(ScenePart):
         yield self._platform, "opacity", None if is_inside else PLATFORM_OPACITY
         feet = np.array([placed.points[name][:2] for name in ("a1", "a2", "a3")])
         base = shapes.plate(feet, BASE_RADIUS, PLATE_TOP - PLATE_THICKNESS, PLATE_TOP)
-        for handle, mesh in ((self._base, base), (self._platform, platform_plate(placed))):
-            yield handle, "visible", view.bodies and placed.is_schematic
-            yield from shapes.draw_mesh(handle, mesh)
+        yield from show(view.bodies and placed.is_schematic, self._base, self._platform)
+        yield from shapes.draw_mesh(self._base, base)
+        yield from shapes.draw_mesh(self._platform, platform_plate(placed))
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of cubes about the joints."""

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import get_args
 
 import viser
 
 from explorer.app.features.designs.feature import DesignName
-from explorer.app.features.feature import (
-    Feature,
-    InBar,
-    Services,
-    Tab,
-    show_html,
-)
+from explorer.app.features.feature import Feature, InBar, Services, Tab, show_html
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs, TwinLegs
 from explorer.app.features.mechanism.folds import Leaves, add_fold_sliders
 from explorer.app.features.mechanism.incidences import Gaps, Tetrahedra
@@ -87,12 +81,8 @@ class MovePanel:
     def __init__(self, services: Services) -> None:
         gui = services.gui
         self._controls = controls = Controls(services)
-
-        def is_point(state: State, at: str) -> bool:
-            return at == "b4" or any(state.design.tool.position)
-
         self._coordinates = _choice(services, "Set by", "view.coordinates", COORDINATES)
-        self._points = _choice(services, "Position of", "view.at", POINTS, is_point)
+        self._points = _choice(services, "Position of", "view.at", POINTS)
         self._switch = gui.add_html("")
         self._sliders = gui.add_folder("")
         with self._sliders:
@@ -177,11 +167,7 @@ def _is_by_lengths(state: State) -> bool:
 
 
 def _choice(
-    services: Services,
-    title: str,
-    path: str,
-    options: Mapping[str, tuple[str, str]],
-    is_ready: Callable[[State, str], bool] = lambda _, __: True,
+    services: Services, title: str, path: str, options: Mapping[str, tuple[str, str]]
 ) -> Chips:
     """Return the options of the value at a path, with words and hint of each, in a titled row."""
     chips = {
@@ -189,7 +175,8 @@ def _choice(
             f"Pose › {title} › {words}",
             hint,
             *choose(path, value, title, words),
-            lambda state, value=value: is_ready(state, value),
+            # Without a tool b4 is the only point.
+            lambda state, value=value: value != "tool" or any(state.design.tool.position),
         )
         for value, (words, hint) in options.items()
     }

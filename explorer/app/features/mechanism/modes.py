@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show
 from explorer.app.features.mechanism import bodies
 from explorer.app.features.mechanism.incidences import HoveredRow
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
@@ -156,9 +156,8 @@ class Ghosts(ScenePart):
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ghosts of this frame."""
         modes = ghost_modes(placed.frame, self._hovered.row)
-        for index, (plate, label) in enumerate(zip(self._plates, self._names, strict=True)):
-            for handle in (plate, label):
-                yield handle, "visible", index < len(modes)
+        for index, nodes in enumerate(zip(self._plates, self._names, strict=True)):
+            yield from show(index < len(modes), *nodes)
         yield self._legs, "visible", bool(modes)
         if not modes:
             return

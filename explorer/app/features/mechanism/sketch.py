@@ -57,10 +57,7 @@ def sketch(design: Design) -> str:
 def _dimension(
     name: str, at: Xy, anchor: Anchor, ends: tuple[Xy, Xy], measured: tuple[Xy, Xy]
 ) -> Element:
-    """Return a dimension line with its text at a place, and thin lines from what it measures.
-
-    Ticks cross its ends at half a right angle.
-    """
+    """Return a dimension line with ticks and text, and thin lines from what it measures."""
     thin = (line(pair, "is-thin") for pair in zip(measured, ends, strict=True))
     ticks = (line(((x - TICK, y + TICK), (x + TICK, y - TICK))) for x, y in ends)
     word = drawing_text(name, *at, None, anchor=anchor)

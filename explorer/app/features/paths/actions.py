@@ -40,30 +40,22 @@ class Go(Action):
             InputError: Both ends are the same pose, or an end is a mode that the present leg
                 lengths do not have.
         """
-        start, goal = ends_of(state)
-        if _is_same(state.design, start, goal):
+        paths, ends = Paths.of(state), ends_of(state)
+        if not StraightMoves.along(ends).have_length(state.design.reach).any():
             raise InputError(
                 "the start and the goal are the same pose: choose another goal, or press Play to "
                 "see the last path again"
             )
         # A goal that follows the present mode would be another one as soon as the platform moves.
         chosen = goal_of(state)
-        if Paths.of(state).kind == "planned":
-            return _with(
-                state,
-                goal=chosen,
-                request=Paths.of(state).request + 1,
-                planning=(start, goal),
-                problem=None,
-                journey=None,
-            )
-        title = f"{_end_words(Paths.of(state).start).capitalize()} to {_end_words(chosen)}"
-        path = Journey(
-            "straight", title, state.design, (start, goal), is_playing=True, tool=state.tool
-        )
-        after = move_to(_with(state, goal=chosen, problem=None, planning=None, journey=path), start)
-        mode = Paths.of(state).start
-        return replace(after, mode=mode) if isinstance(mode, int) else after
+        if paths.kind == "planned":
+            after = _with(state, goal=chosen, problem=None, journey=None)
+            return _with(after, request=paths.request + 1, planning=ends)
+        title = f"{_end_words(paths.start).capitalize()} to {_end_words(chosen)}"
+        path = Journey("straight", title, state.design, ends, is_playing=True, tool=state.tool)
+        after = _with(state, goal=chosen, problem=None, planning=None, journey=path)
+        after = move_to(after, ends[0])
+        return replace(after, mode=paths.start) if isinstance(paths.start, int) else after
 
     def describe(self, after: State) -> str:
         """Return which path was played or requested."""
@@ -119,11 +111,6 @@ def _legs(state: State) -> Joints:
         if np.abs(np.subtract(first, last)).max() <= SAME * state.design.reach:
             return first
     return joints_of(state.design, state.pose)
-
-
-def _is_same(design: Design, start: Pose, goal: Pose) -> bool:
-    """Return whether two poses are the same to the rounding of a table."""
-    return not StraightMoves.along((start, goal)).have_length(design.reach).any()
 
 
 def _end_words(end: End) -> str:
@@ -239,14 +226,8 @@ def plan(
 ) -> PlannedPath:
     """Return a path between two poses, as `explorer.paths.planning.plan_path` finds it.
 
-    Args:
-        design: The manipulator.
-        ends: Start and goal.
-        seconds: Time for the search.
-        tool: Point that moves straight in the platform frame, in design units; None for b4.
-        load: (F; M) at the tool point, base axes, in N and N × unit, that the path has to hold.
-        weighed: Bodies whose weights act besides the load.
-        density: Density of the parts, in kg/m³.
+    If there is a load to hold, the weights of bodies act besides; the density of the parts is in
+    kg/m³.
     """
     weights = own = None
     if load is not None:

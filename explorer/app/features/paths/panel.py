@@ -84,9 +84,7 @@ class PathsPanel:
         self._kind_chips = Chips(services.buttons, services.session, "paths.kind", "", kinds)
         gui.add_html(markup.beside(2))
         with gui.add_folder("Path"):
-            self._numbers: dict[EndName, viser.GuiHtmlHandle] = {
-                end: self._add_end(gui, end) for end in ENDS
-            }
+            self._numbers = [self._add_end(gui, end) for end in ENDS]
             self._kinds = gui.add_html("")
             self._controls.checkbox(
                 "Hold the load",
@@ -118,7 +116,10 @@ class PathsPanel:
                 "Time (s)",
                 "Time on the path. A straight path takes 8 s; on a planned one the fastest "
                 "actuator moves a tenth of the reach per second.",
-                ControlBinding(_time_played, lambda _, value: actions.SetPathTime(value)),
+                ControlBinding(
+                    lambda frame: journey.at if (journey := journey_of(frame.state)) else 0.0,
+                    lambda _, value: actions.SetPathTime(value),
+                ),
                 _time_span,
                 disabled=lambda state: journey_of(state) is None,
             )
@@ -157,7 +158,7 @@ class PathsPanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         state = frame.state
-        for end, handle in self._numbers.items():
+        for end, handle in zip(ENDS, self._numbers, strict=True):
             is_typed = _is_typed(state, end)
             yield from show_html(handle, "" if is_typed else end_numbers(state, end))
         chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
@@ -231,26 +232,22 @@ def kind_note(state: State) -> str:
     if Paths.of(state).kind == "straight":
         return markup.dim("May pass singular poses, which are marked.")
     try:
-        start, goal = (
-            int(mode_of(margins(e.position, e.rotation))) for e in actions.ends_of(state)
-        )
+        ends = actions.ends_of(state)
     except InputError:
         return ""
+    start, goal = (int(mode_of(margins(end.position, end.rotation))) for end in ends)
     if start == goal:
         return markup.dim(f"Both ends are in mode {start} ({mode_name(start)}).")
-    return (
-        f'<span class="ex-close" title="Every path between two modes is singular">'
-        f"There is none from mode {start} to mode {goal}.</span>"
-    )
+    words = f"There is none from mode {start} to mode {goal}."
+    return f'<span class="ex-close" title="Every path between two modes is singular">{words}</span>'
 
 
 def plan_words(state: State) -> str | None:
     """Return the progress of planning, or why it led to no path, as HTML; None otherwise."""
     paths = Paths.of(state)
     if paths.is_planning:
-        cancel = press_button(
-            "paths.cancel", "", "Cancel", hint="Stop the search", class_name="ex-button"
-        )
+        hint = "Stop the search"
+        cancel = press_button("paths.cancel", "", "Cancel", hint=hint, class_name="ex-button")
         words = markup.dim(f"Planning, for {format_number(paths.seconds)} s at most …")
         return markup.box(f'<div class="ex-line">{words}{cancel}</div>')
     if paths.problem is not None:
@@ -259,10 +256,7 @@ def plan_words(state: State) -> str | None:
 
 
 def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") -> str:
-    """Return the title of the path, its crossings and loads, and its buttons, as HTML.
-
-    The button `clear` removes the path.
-    """
+    """Return the title of the path, its crossings and loads, and its buttons, as HTML."""
     journey = journey_of(state)
     if journey is None:
         return markup.box(markup.dim("No path yet. Choose a goal and press Go."))
@@ -315,10 +309,7 @@ def _is_typed(state: State, end: EndName) -> bool:
 
 
 def typed_numbers(state: State, end: EndName) -> tuple[Triple, Triple]:
-    """Return position and angles in degrees of an end that is typed; zeros for another.
-
-    The position is that of b4 or of the tool point.
-    """
+    """Return position, of b4 or of the tool point, and angles of a typed end; zeros for another."""
     chosen = _end(state, end)
     if not isinstance(chosen, Pose):
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -339,11 +330,6 @@ def _set_typed(state: State, end: EndName, index: int, triple: Triple) -> Action
 
 def _is_planned(state: State) -> bool:
     return Paths.of(state).kind == "planned"
-
-
-def _time_played(frame: Frame) -> float:
-    journey = journey_of(frame.state)
-    return 0.0 if journey is None else journey.at
 
 
 def _time_span(state: State) -> Span:

@@ -56,12 +56,8 @@ LEAST_TOP, MOST_TOP = 120.0, 250.0
 class TimeChart:
     """A chart over time, whose axis has no words: the slider above the chart names it.
 
-    Args:
-        gui: Controls of the page.
-        series: Its lines and dots, without the line at the present time.
-        axes: Its vertical axis, and that of its levels, at the right.
-        height: Height between its axes, in pixels.
-        has_times: Whether the axis of time has numbers; those of a chart below serve it too.
+    The series come without the line at the present time; the axes are the vertical one, and that of
+    its levels, at the right. A chart may have no numbers of time, if those of one below serve it.
     """
 
     def __init__(
@@ -153,12 +149,10 @@ def demand_note(state: State) -> str:
 
 
 class ChartQuantity(NamedTuple):
-    """A number of each incidence that a chart shows.
+    """A number of each incidence that a chart shows; its name has braces for the incidence.
 
-    Attributes:
-        name: Its name, with braces for the number of the incidence.
-        flat: Its values where a fold is flat.
-        of: Function from positions (..., 3) and rotations (..., 3, 3) to its values (..., 3).
+    It has the values `flat` where a fold is flat, and those `of` positions (..., 3) and rotations
+    (..., 3, 3) have the shape (..., 3).
     """
 
     name: str

@@ -47,16 +47,9 @@ STRAIGHT_SECONDS = 8.0
 
 @dataclass(frozen=True)
 class Journey:
-    """A path and how far along it the platform is.
+    """A path by its corners, and the time in seconds up to which it has been played.
 
-    Attributes:
-        kind: Whether it is the straight move, or was planned.
-        title: Title on the page.
-        design: The design that it was made for.
-        poses: The corners of the path.
-        at: Time up to which it has been played, in seconds.
-        is_playing: Whether it is being played.
-        tool: The tool point in the platform frame, if its moves are straight; None for those of b4.
+    Its moves are straight for the tool point in the platform frame, or for b4 if there is none.
 
     Raises:
         InputError: Fewer than two corners, or all of them are the same pose.
@@ -109,16 +102,12 @@ class Paths(FeaturePart, name="paths"):
     """The path of the page, and the settings of the next one.
 
     Attributes:
-        start, goal: Ends of the next path.
-        kind: Kind of the next path.
         seconds: Longest time of planning, in seconds.
-        holds_load: Whether a planned path holds the load of the page all along.
         drives: Time law for which speeds and forces of the actuators are computed, or off.
-        duration: The given time, in seconds.
+        duration: The given time of the path, in seconds.
         request: Number of the last request to plan; 0 before the first.
         planning: Start and goal of the path that is being planned; None if none is.
         problem: Why planning failed; None if it did not.
-        journey: The present path; None if there is none.
 
     Raises:
         InputError: A time for planning or for the path that is not above zero.

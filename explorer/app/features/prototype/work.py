@@ -83,13 +83,7 @@ def stock_of(part: PrototypePart, unit_mm: float) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Parts:
-    """The parts of a design, and their list.
-
-    Attributes:
-        prototype: The parts.
-        meshes: Meshes of the parts in their order and frames, in design units.
-        lines: Lines of the list of parts.
-    """
+    """The parts of a design, their meshes in their frames in design units, and their list."""
 
     prototype: Prototype
     meshes: tuple[Drawn, ...]
