@@ -158,6 +158,21 @@ def show(visible: bool, *parts: Any) -> Updates:
             yield from part.show(visible)
 
 
+def follow_drags(
+    services: Services,
+    gizmo: viser.TransformControlsHandle,
+    key: str,
+    action_of: Callable[[State], Action],
+) -> None:
+    """Post the action of each movement of a gizmo by a user; of one key the newest counts."""
+
+    @gizmo.on_update
+    async def _(event: viser.TransformControlsEvent) -> None:
+        if event.client_id is not None:
+            stamp = gizmo.update_timestamp
+            services.session.post(key, action_of, stamp=stamp, who=event.client_id)
+
+
 def html_of(feed: AnyFeed, html: Callable[[Any], str], title: str, button: str = "") -> str:
     """Return the drawing of a feed as HTML, pale while it is outdated, or why there is none.
 

@@ -186,7 +186,7 @@ class Boxes(Instances):
 class Patch:
     """A translucent quadrilateral with an outline."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, *, opacity: float) -> None:
+    def __init__(self, scene: viser.SceneApi, name: str, opacity: float) -> None:
         square = np.zeros((4, 3)), np.array([[0, 1, 2], [0, 2, 3]])
         self._plane = add_translucent(scene, f"{name}/plane", square, opacity)
         self._outline = add_lines(scene, f"{name}/hem", len(SIDES), None, 1.5)
@@ -367,10 +367,9 @@ def write_label(handle: viser.LabelHandle, text: str, place: FloatArray) -> Iter
 
 
 def label_height(colour: Rgb) -> float:
-    """Return the `font_scene_height` by which a label has a colour.
+    """Return the `font_scene_height` by which a script gives a label its colour.
 
-    viser's labels have none; they use the scene height only if their size is that of things in the
-    scene, so that the script finds the colour there.
+    viser's labels have none, and use this height only if their size is that of things in the scene.
     """
     red, green, blue = colour
     return float(red << 16 | green << 8 | blue)

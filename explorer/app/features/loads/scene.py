@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import viser
 
-from explorer.app.features.feature import Services, show
+from explorer.app.features.feature import Services, follow_drags, show
 from explorer.app.features.loads.load import Loads, SetForce, fitting_scale, round_force
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
@@ -193,8 +192,7 @@ class LoadHandle(ScenePart):
             depth_test=False,
             visible=False,
         )
-        self._session = services.session
-        self.handle.on_update(self._pull)
+        follow_drags(services, self.handle, "pull", self._pull)
 
     def force(self, state: State) -> Triple:
         """Return the force whose arrow ends where the gizmo is."""
@@ -202,6 +200,9 @@ class LoadHandle(ScenePart):
         scale = state.view.forces.scale
         per_length = scale / (scene_scale(state) * state.design.reach)
         return round_force(per_length * (np.asarray(self.handle.position) - tool), scale)
+
+    def _pull(self, state: State) -> SetForce:
+        return SetForce(self.force(state), keeps_scale=True)
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that keep the gizmo at the tip of the arrow."""
@@ -215,15 +216,6 @@ class LoadHandle(ScenePart):
         if not visible or np.allclose(self.force(state), state.view.forces.force, 0.0, same):
             return
         yield self.handle, "position", tuple(load_tip(placed).tolist())
-
-    async def _pull(self, event: viser.TransformControlsEvent) -> None:
-        if event.client_id is not None:
-            self._session.post(
-                "pull",
-                lambda state: SetForce(self.force(state), keeps_scale=True),
-                stamp=self.handle.update_timestamp,
-                who=event.client_id,
-            )
 
 
 def is_visible(placed: Placed) -> bool:

@@ -278,7 +278,7 @@ class Flag:
         # Each browser makes its mesh.
         self._point = scene.add_icosphere(f"{root}/flag/point", subdivisions=8)
         self._line = scene.add_mesh_simple(f"{root}/flag/line", *shapes.cylinder(), wxyz=ALONG_X)
-        self._patch = shapes.Patch(scene, f"{root}/flag", opacity=PLANE_OPACITY)
+        self._patch = shapes.Patch(scene, f"{root}/flag", PLANE_OPACITY)
 
     def updates(self, placed: Placed, line: Extent, plane: Extent, size: float) -> Updates:
         """Yield the updates that draw the flag; `size` scales its thicknesses."""

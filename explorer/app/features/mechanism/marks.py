@@ -5,9 +5,8 @@ from __future__ import annotations
 import contextlib
 
 import numpy as np
-import viser
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, follow_drags
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
 from explorer.app.state.moves import SetPose
@@ -53,10 +52,9 @@ class DragHandle(ScenePart):
         self.handle = services.scene.add_transform_controls(
             HANDLE_NAME, scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
         )
-        self._session = services.session
         # Time of the last movement that the platform has followed.
         self._followed = self.handle.update_timestamp
-        self.handle.on_update(self._move_platform)
+        follow_drags(services, self.handle, "drag", self._follow)
 
     def pose(self, state: State) -> Pose:
         """Return the pose of the platform where the gizmo is.
@@ -87,15 +85,6 @@ class DragHandle(ScenePart):
         if not _is_handle_visible(placed):
             return NO_POINTS
         return placed.point + ARROW_LENGTH * placed.frame.snapshot.rotation.T
-
-    async def _move_platform(self, event: viser.TransformControlsEvent) -> None:
-        if event.client_id is not None:
-            self._session.post(
-                "drag",
-                self._follow,
-                stamp=self.handle.update_timestamp,
-                who=event.client_id,
-            )
 
     def _follow(self, state: State) -> SetPose:
         self._followed = self.handle.update_timestamp

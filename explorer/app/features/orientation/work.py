@@ -110,20 +110,14 @@ def _tilt_to(state: State, angles: TiltTorsion) -> State:
 # Degrees that a tilt keeps from the limit that ends it, where the pose may be singular.
 INSIDE = 0.1
 
+# Number of nodes on each axis of the extent, at which tilts are computed.
 NODES = 20
-"""Number of nodes on each axis of the extent, at which tilts are computed."""
-
 # Number of parts of the nodes, between which progress is reported.
 PARTS = 10
 # Digits of a torsion in degrees beyond which tilts are not computed again.
 DIGITS = 3
-
-ORIENTATIONS = 33
-"""Number of orientations that stand for a range of tilts."""
-
-TURNED_ORIENTATIONS = 17
-"""The same for each of three torsions, if the range has several."""
-
+# Number of orientations that stand for a range of tilts, alone and with each of three torsions.
+ORIENTATIONS, TURNED_ORIENTATIONS = 33, 17
 
 PositionRequest: TypeAlias = tuple[Design, Triple, Triple | None]
 """A request for the orientations that a position of b4, or of a tool point, can have."""

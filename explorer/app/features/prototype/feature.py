@@ -17,7 +17,6 @@ from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH
-from explorer.app.scene.surfaces import Drawn
 from explorer.app.session.session import Who
 from explorer.app.state.actions import draw_as
 from explorer.app.state.frame import Frame
@@ -201,8 +200,6 @@ class PrototypeScene(ScenePart):
             self._nodes[name] = scene.add_mesh_simple(
                 f"/prototype/{path}", *NO_MESH, color=COLOURS[kind], visible=False
             )
-        self._drawn: tuple[Parts | None, float] = None, 0.0
-        self._meshes: dict[str, Drawn] = {}
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the parts of a frame."""
@@ -213,17 +210,14 @@ class PrototypeScene(ScenePart):
         if parts is None:
             return
         names = [part.name for part in parts.prototype.parts]
-        if self._drawn[0] is not parts or self._drawn[1] != placed.scale:
-            self._drawn, scale = (parts, placed.scale), np.float32(placed.scale)
-            meshes = ((vertices * scale, faces) for vertices, faces in parts.meshes)
-            self._meshes = dict(zip(names, meshes, strict=True))
         places, platform = places_of(placed, parts), names.index("platform")
         origins = placed.scale * places.origin
         turns = quaternion_from_rotation(places.rotation).tolist()
-        for name, origin, turn in zip(names, origins, turns, strict=True):
+        meshes = parts.meshes_in(placed.scale)
+        for name, mesh, origin, turn in zip(names, meshes, origins, turns, strict=True):
             node = self._nodes[name]
-            yield node, "vertices", self._meshes[name][0]
-            yield node, "faces", self._meshes[name][1]
+            yield node, "vertices", mesh[0]
+            yield node, "faces", mesh[1]
             place = origin
             if name in BALLS:
                 place = (origin - origins[platform]) @ places.rotation[platform]

@@ -17,6 +17,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
+from explorer.numerics.computed_once import computed_once
 from explorer.prototype.assembly import Prototype, bill_of_materials, make_prototype
 from explorer.prototype.shapes import PrototypePart
 
@@ -93,6 +94,11 @@ class Parts:
     def floor(self) -> float:
         """Height of the lowest point of the base, in design units."""
         return float(self.meshes[0][0][:, 2].min())
+
+    @computed_once
+    def meshes_in(self, scale: float) -> tuple[Drawn, ...]:
+        """Return the meshes in scene units, of which there are `scale` in a design unit."""
+        return tuple((vertices * np.float32(scale), faces) for vertices, faces in self.meshes)
 
 
 def parts_drawing(design: Design) -> Parts | ExplorerError:

@@ -91,10 +91,7 @@ def stratum_name(stratum: Stratum) -> str:
 
 
 def strata_distances(request: tuple[Design, Pose]) -> dict[Stratum, float]:
-    """Return the distances of a design in a pose to all strata, in design units.
-
-    A distance is the root-mean-square displacement of b1 to b4 to the nearest pose in the stratum.
-    """
+    """Return the root-mean-square displacements of b1 to b4 to all strata, in design units."""
     return {stratum: pose.distance for stratum, pose in nearest_in_strata(*request).items()}
 
 

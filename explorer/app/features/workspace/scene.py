@@ -154,7 +154,7 @@ class _SingularPlane:
 
     def __init__(self, scene: viser.SceneApi, index: int) -> None:
         self._index = index
-        self._patch = Patch(scene, f"/singular/{index + 1}", opacity=PLANE_OPACITY)
+        self._patch = Patch(scene, f"/singular/{index + 1}", PLANE_OPACITY)
         self._label = add_label(scene, f"/singular/{index + 1}/label", f"δ{index + 1} = 0")
 
     def updates(self, placed: Placed) -> Updates:
