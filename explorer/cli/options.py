@@ -112,10 +112,9 @@ class JsonOptions:
         lines: Iterable[str],
         errors: Sequence[ExplorerError] = (),
     ) -> None:
-        """Write the answer to standard output: as JSON with `--json`, otherwise as text.
+        """Write the answer as JSON with `--json`, otherwise as text, then raise its errors.
 
-        Lines of a generator are computed only if they are written. Errors, which keep the answer
-        from being whole, are raised after it.
+        Lines of a generator are computed only if they are written.
         """
         if self.json:
             write_json(as_json())
@@ -243,9 +242,7 @@ class EndOptions:
     def end(self, start: Pose, to: values.Numbers | None, tool: Triple | None) -> Pose | None:
         """Return the given pose completed from the start, as `make_pose` does; None without one."""
         given = to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion, self.to_folds
-        if all(value is None for value in given):
-            return None
-        return make_pose(self, "to_", start, to, tool)
+        return make_pose(self, "to_", start, to, tool) if any(given) else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -265,8 +262,7 @@ class OrientationOptions:
     @property
     def has_orientation(self) -> bool:
         """Whether one of the options is given."""
-        given = self.quaternion, self.yaw_pitch_roll, self.tilt_torsion
-        return any(each is not None for each in given)
+        return any((self.quaternion, self.yaw_pitch_roll, self.tilt_torsion))
 
     def oriented_home(self, design: Design) -> Pose:
         """Return the home pose of the design with the given orientation, as `make_pose` does."""
@@ -299,10 +295,7 @@ def check_has_limits(design: Design) -> None:
 
 
 def carrying_part(workspace: Workspace, load: Six, tolerance: float | None) -> CarriedRegion:
-    """Return the part of the workspace of a design with limits that holds a load.
-
-    The load is (F; M) at the tool besides the payload, base axes, in N and N × unit.
-    """
+    """Return the part of a workspace that holds a load (F; M) at the tool, in N and N × unit."""
     from explorer.workspace.carried_region import carried_region
 
     check_has_limits(workspace.design)

@@ -79,10 +79,7 @@ def limits_json(snapshot: Snapshot) -> dict[str, object]:
 
 
 def limits_lines(snapshot: Snapshot, subject: str = "") -> Iterator[str]:
-    """Yield whether a pose is within the limits or singular, and the limits that it violates.
-
-    The subject stands before the verdict, such as "the start is ".
-    """
+    """Yield whether a pose is within the limits, after a subject, and the limits it violates."""
     kept = "within the limits, but singular" if snapshot.is_singular else "within the limits"
     yield f"{subject}{'outside the limits:' if snapshot.violations else kept}"
     yield from (f"  {violation}" for violation in snapshot.violations)
@@ -184,9 +181,9 @@ def block_lines(blocks: Iterable[kinds.Block]) -> Iterator[str]:
                 yield f"{text_of(title)}{': ' if title and words else ''}{text_of(words)}"
             case kinds.Facts(title, facts, hint):
                 rows = [(fact.name, text_of(fact.words), text_of(fact.remark)) for fact in facts]
-                yield from (*_title(title, hint), table(rows, "<<<"))
+                yield from (title, *[hint] * bool(hint), table(rows, "<<<"))
             case kinds.Table(title, _, hint, _):
-                yield from (*_title(title, hint), _table(block))
+                yield from (title, *[hint] * bool(hint), _table(block))
             case kinds.Split(title, names, shares):
                 parts = (
                     f"{name} {_share(share)}" for name, share in zip(names, shares, strict=True)
@@ -196,19 +193,18 @@ def block_lines(blocks: Iterable[kinds.Block]) -> Iterator[str]:
 
 def text_of(words: kinds.Words) -> str:
     """Return words with the numbers in them as text."""
-    return "".join(map(_part, kinds.parts_of(words)))
-
-
-def _part(part: str | kinds.Number | kinds.Vector | kinds.Share) -> str:
-    match part:
-        case str():
-            return part
-        case kinds.Number():
-            return f"{_figure(part.value, part.size or part.span, '∞')}{part.unit}"
-        case kinds.Vector():
-            return f"{'  '.join(figures(part.values))}{part.unit}"
-        case kinds.Share():
-            return _share(part.value)
+    text = ""
+    for part in kinds.parts_of(words):
+        match part:
+            case str():
+                text += part
+            case kinds.Number():
+                text += f"{_figure(part.value, part.size or part.span, '∞')}{part.unit}"
+            case kinds.Vector():
+                text += f"{'  '.join(figures(part.values))}{part.unit}"
+            case kinds.Share():
+                text += _share(part.value)
+    return text
 
 
 def _share(share: float | None) -> str:
@@ -217,12 +213,6 @@ def _share(share: float | None) -> str:
 
 def _figure(value: float, size: float, infinite: str) -> str:
     return figure(value, size) if math.isfinite(value) else infinite.replace("∞", "infinite")
-
-
-def _title(title: str, hint: str) -> Iterator[str]:
-    yield title
-    if hint:
-        yield hint
 
 
 def _table(block: kinds.Table) -> str:

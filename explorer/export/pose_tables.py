@@ -17,6 +17,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 import numpy as np
@@ -25,6 +26,7 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.export.tables import length_heads
 from explorer.files.json_text import decode_text
+from explorer.files.writing import read_at_most
 from explorer.mechanism import kinematics
 from explorer.mechanism.configuration import Configuration, Point, offset_of
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
@@ -130,10 +132,10 @@ class PoseTable:
         """
         missing = [name for name in names if name not in self.columns]
         if missing:
+            example = "_".join([names[0], *list(_UNITS[names[0]])[:1]])
             raise InputError(
                 f"{self.file} has no column {missing[0]} among {', '.join(self.headings)}; it "
-                f"needs {', '.join(names)}, each with its unit if it has one, such as "
-                f"{names[0]}{_example(names[0])}"
+                f"needs {', '.join(names)}, each with its unit if it has one, such as {example}"
             )
         columns = [self.columns[name] for name in names]
         values = np.empty((len(self.rows), len(names)))
@@ -157,8 +159,9 @@ class PoseTable:
         raise InputError(f"{self.file}, line {line}, column {heading}: {cells[place]!r}: {needs}")
 
 
-def _example(name: str) -> str:
-    return f"_{next(iter(_UNITS[name]))}" if _UNITS[name] else ""
+def read_table(path: Path, unit_mm: float) -> Table:
+    """Return the table in a CSV file, as `parse_table` does."""
+    return parse_table(str(path), read_at_most(path), unit_mm)
 
 
 def parse_table(file: str, data: bytes, unit_mm: float) -> PoseTable:

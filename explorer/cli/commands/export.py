@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import datetime as dt
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -155,10 +155,8 @@ def _as_lines(facts: Facts) -> Iterator[str]:
     if facts.get("agrees") is False:
         yield f"This differs from the workspace: {output.DISAGREES}."
     for actuator in facts.get("actuators", []):
-        stroke, asked = (
-            f"{low:.1f} to {high:.1f}"
-            for low, high in (actuator["stroke_mm"], actuator["asked_mm"])
-        )
+        ends = (actuator["stroke_mm"], actuator["asked_mm"])
+        stroke, asked = (f"{low:.1f} to {high:.1f}" for low, high in ends)
         yield f"leg {actuator['leg']}: stroke {stroke} mm (the limits require {asked} mm)"
 
 
@@ -223,20 +221,20 @@ def _mechanism(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     prototype = make_prototype(command.read_design())
     data = assembly.assembly_bytes(prototype, file_format)
     bill = bill_of_materials(prototype, command.density or DENSITY)
-    part_keys = ["name", "size_mm", "volume_mm3", "mass_kg"]
-    actuator_keys = ["leg", "stroke_mm", "asked_mm", "diameter_mm", "mass_kg"]
+    part_keys = ("name", "size_mm", "volume_mm3", "mass_kg")
+    parts = [(each.name, each.size, each.volume, each.mass) for each in bill.items]
+    actuator_keys = ("leg", "stroke_mm", "asked_mm", "diameter_mm", "mass_kg")
+    actuators = [(a.leg, a.stroke, a.required, a.diameter, a.mass) for a in bill.actuators]
     return data, {
         "format": file_format,
-        "parts": [
-            dict(zip(part_keys, (part.name, part.size, part.volume, part.mass), strict=True))
-            for part in bill.items
-        ],
-        "actuators": [
-            dict(zip(actuator_keys, (a.leg, a.stroke, a.required, a.diameter, a.mass), strict=True))
-            for a in bill.actuators
-        ],
+        "parts": _as_dicts(part_keys, parts),
+        "actuators": _as_dicts(actuator_keys, actuators),
         "mass_kg": bill.mass,
     }
+
+
+def _as_dicts(keys: Sequence[str], rows: Iterable[Sequence[object]]) -> list[dict[str, object]]:
+    return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
 def _simulation(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
@@ -308,6 +306,7 @@ def _check_format(file_format: str, name: str, only: str, suffix: str | None = N
 
 
 _ORIENTATION = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
+_POSE = ("position", "folds", *_ORIENTATION)
 _FOLDERS: dict[What, tuple[str, str, Callable[[Design], dict[str, bytes]]]] = {
     "kernel": ("kernel", "c", kernel_files),
     "linuxcnc": ("configuration", "ini", linuxcnc_files),
@@ -318,20 +317,16 @@ _WRITERS: dict[What, tuple[Callable[[ExportCommand, str], tuple[Data, Facts]], t
     "hull": (_mesh, ("tolerance", "load", *_ORIENTATION)),
     "mechanism": (_mechanism, ("density",)),
     "simulation": (_simulation, ("density", "masses", "errors", "typical")),
-    "scene": (_scene, ("position", "folds", *_ORIENTATION)),
+    "scene": (_scene, _POSE),
     "page": (_page, ()),
-    "figure": (
-        _figure,
-        ("position", "folds", *_ORIENTATION, "view", "width", "black", "tetrahedra"),
-    ),
+    "figure": (_figure, (*_POSE, "view", "width", "black", "tetrahedra")),
     "kernel": (_folder, ()),
     "linuxcnc": (_folder, ()),
 }
 """The function that writes each object, and its options besides those of all."""
 
 
-def _simulation_json(model: simulation.SimulationModel) -> dict[str, Any]:
-    """Return names, servos and what is left out of a model as plain values."""
+def _simulation_json(model: simulation.SimulationModel) -> Facts:
     servos = model.servos
     return {
         "format": "mjcf",
@@ -345,7 +340,7 @@ def _simulation_json(model: simulation.SimulationModel) -> dict[str, Any]:
     }
 
 
-def _imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:
+def _imperfect_json(machine: ImperfectMachine) -> Facts:
     """Return deviations and errors of the tool at home as plain values."""
     design = machine.design
     off, most = (
@@ -353,10 +348,9 @@ def _imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:
         for each in (machine.deviations, accuracy.source_errors(design))
     )
     rows = zip(accuracy.SOURCES, off.tolist(), most.tolist(), accuracy.UNITS, strict=True)
-    names = ("name", "deviation", "largest", "unit")
     return {
         "seed": machine.seed,
-        "deviations": [dict(zip(names, row, strict=True)) for row in rows],
+        "deviations": _as_dicts(("name", "deviation", "largest", "unit"), rows),
         "tool_error": _tool_json(design, machine.tool_error()),
     }
 
@@ -369,10 +363,8 @@ def _tool_json(design: Design, error: FloatArray) -> dict[str, list[float]]:
 
 
 def _simulation_lines(facts: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the tables of a model from the facts on it and on the imperfect machine."""
     if "deviations" in facts:
-        yield from _imperfect_lines(facts)
-        yield ""
+        yield from (*_imperfect_lines(facts), "")
     keys = ("servo_stiffness_n_mm", "servo_forces_n", "servo_rotors_kg")
     columns = (output.figures(facts[key]) for key in keys)
     head = ("servo", "stiffness, N/mm", "force at home, N", "rotor, kg")

@@ -48,15 +48,15 @@ class InterferenceCommand(
         design = self.with_radii(self.read_design())
         start, tool = self.pose(design), self.tool(design)
         here, end = evaluate(design, start), self.end(start, self.to, tool)
-        if end is None:
-            if self.steps is not None:
-                raise InputError(f"--steps divides a move; say where it goes {options.END_OPTIONS}")
+        if end is not None:
+            steps = self.steps or _steps_of(design, start, end, tool)
+            move = moves.move_clearance(design, start, end, steps=steps, tool=tool)
+            there = evaluate(design, end)
+            self.write(lambda: _move_json(move, here, there), _move_lines(move, here, there))
+        elif self.steps is not None:
+            raise InputError(f"--steps divides a move; say where it goes {options.END_OPTIONS}")
+        else:
             self.write(lambda: _pose_json(here, tool), _pose_lines(here, tool))
-            return
-        steps = self.steps or _steps_of(design, start, end, tool)
-        move = moves.move_clearance(design, start, end, steps=steps, tool=tool)
-        there = evaluate(design, end)
-        self.write(lambda: _move_json(move, here, there), _move_lines(move, here, there))
 
 
 def _steps_of(design: Design, start: Pose, end: Pose, tool: Triple | None) -> int:

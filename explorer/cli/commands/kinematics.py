@@ -13,7 +13,7 @@ import numpy as np
 from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import pose_tables
-from explorer.files.writing import check_writable, read_at_most, write_whole
+from explorer.files.writing import check_writable, write_whole
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism import kinematics
 from explorer.mechanism.configuration import Configuration, tool_offset
@@ -54,7 +54,7 @@ class InverseCommand(options.JsonOptions, options.PoseOptions):
         if files is not None:
             if self.position is not None or self.folds is not None:
                 raise InputError("--poses has the positions; leave --position and --folds out")
-            table = _read_table(files[0], design)
+            table = pose_tables.read_table(files[0], design.unit_mm)
             if self.has_orientation and table.has_orientations:
                 raise InputError(
                     f"{table.file} has orientations: leave its columns or the options of the "
@@ -62,8 +62,7 @@ class InverseCommand(options.JsonOptions, options.PoseOptions):
                 )
             rotation = self.oriented_home(design).rotation
             poses = pose_tables.read_poses(table, design, rotation, self.at)
-            answer = pose_tables.inverse_answer(table, poses, self.at)
-            _write_answer(self, files, answer)
+            _write_answer(self, files, pose_tables.inverse_answer(table, poses, self.at))
             return
         snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
         self.write(lambda: _inverse_json(snapshot, tool), _inverse_lines(snapshot, tool))
@@ -97,11 +96,6 @@ def _files(option: str, table: Path | None, out: Path | None) -> tuple[Path, Pat
         raise InputError(f"--out {out} is the table to read; name another file")
     check_writable(out)
     return table, out
-
-
-def _read_table(path: Path, design: Design) -> pose_tables.PoseTable:
-    data = read_at_most(path)
-    return pose_tables.parse_table(str(path), data, design.unit_mm)
 
 
 def _write_answer(
@@ -156,10 +150,9 @@ class ForwardCommand(options.JsonOptions, options.PointOptions):
         if (files is None) == (self.joints is None):
             raise InputError("give either --joints or --joints-file")
         if files is not None:
-            table = _read_table(files[0], design)
+            table = pose_tables.read_table(files[0], design.unit_mm)
             joints = pose_tables.read_joints(table)
-            answer = pose_tables.forward_answer(table, design, joints, self.at)
-            _write_answer(self, files, answer)
+            _write_answer(self, files, pose_tables.forward_answer(table, design, joints, self.at))
             return
         joints = np.array(self.joints, dtype=np.float64)
         squares = kinematics.discriminants(design, joints)
@@ -234,30 +227,26 @@ def _mode_lines(modes: kinematics.ForwardKinematics, tool: Triple | None) -> Ite
 
 
 def _failure_message(design: Design, joints: FloatArray, squares: FloatArray) -> str:
+    """Return what does not close, and the smallest change of a single joint that closes it."""
     failures = [
         f"trilateration {index + 1} (tetrahedron {' '.join(TETRAHEDRA[index])}) has "
         f"δ{index + 1}² = {square:.4g}"
         for index, square in enumerate(squares.tolist())
         if square < 0.0
     ]
-    return (
-        f"the lengths do not close: {' and '.join(failures)}, which must not be negative; "
-        f"{_least_change(design, joints)}"
-    )
-
-
-def _least_change(design: Design, joints: FloatArray) -> str:
-    """Return the smallest change of a single joint with which the lengths close, in words."""
     moves: list[tuple[float, str]] = []
     for index, intervals in enumerate(feasible_intervals(design, joints)):
         nearest = nearest_feasible(design, joints, index, intervals)
-        if nearest is None:
-            continue
-        value = float(joints[index])
-        moves.append((abs(nearest - value), f"{JOINTS[index]} from {value:.10g} to {nearest!r}"))
-    if not moves:
-        return "no change of a single joint closes them"
-    return f"the least change of one joint that closes them is {min(moves)[1]}"
+        if nearest is not None:
+            value = float(joints[index])
+            words = f"{JOINTS[index]} from {value:.10g} to {nearest!r}"
+            moves.append((abs(nearest - value), words))
+    change = "no change of a single joint closes them"
+    if moves:
+        change = f"the least change of one joint that closes them is {min(moves)[1]}"
+    return (
+        f"the lengths do not close: {' and '.join(failures)}, which must not be negative; {change}"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -299,13 +288,12 @@ def _singularity_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, obje
 def _tool_json(snapshot: Snapshot, tool: Triple) -> dict[str, object]:
     """Return the tool's position, and the condition of J and the ellipsoids at the tool."""
     found = ellipsoids.performance(snapshot.design, snapshot.pose, tool)
-    both = {"translation": found.translation, "rotation": found.rotation}
     return {
         **output.tool_json(snapshot.pose, tool),
         "tool_inverse_condition": _condition_at(snapshot, tool),
         "tool_ellipsoids": {
             name: {"gain": [*map(output.finite, each.gain.tolist())], "axes": each.axes.T}
-            for name, each in both.items()
+            for name, each in (("translation", found.translation), ("rotation", found.rotation))
         },
     }
 
@@ -317,22 +305,21 @@ def _condition_at(snapshot: Snapshot, tool: Triple) -> float:
 def _singularity_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
     # Only this text needs them, and they would delay every command of the module.
     from explorer.measures.blocks import singularity as blocks
-    from explorer.measures.blocks.block import Statement
+    from explorer.measures.blocks.block import Block, Statement
     from explorer.measures.verdict import verdict
 
     design, here = snapshot.design, verdict(snapshot)
     yield from (output.heading(design), output.pose_table(design, snapshot.pose, tool))
-    yield from output.block_lines(
-        (
-            Statement(here.title, here.reason(design.millimetres)),
-            *blocks.freedoms(snapshot),
-            blocks.margin_table(snapshot),
-            blocks.tetrahedra(snapshot),
-            blocks.conditioning(snapshot),
-            blocks.nearest_poses(snapshot),
-        )
-    )
+    shown: list[Block] = [
+        Statement(here.title, here.reason(design.millimetres)),
+        *blocks.freedoms(snapshot),
+        blocks.margin_table(snapshot),
+        blocks.tetrahedra(snapshot),
+        blocks.conditioning(snapshot),
+        blocks.nearest_poses(snapshot),
+    ]
     if tool is not None:
         found = ellipsoids.performance(design, snapshot.pose, tool)
-        yield from output.block_lines(blocks.ellipsoids(found, "the tool"))
-        yield from output.block_lines([blocks.tool_condition(_condition_at(snapshot, tool))])
+        shown += blocks.ellipsoids(found, "the tool")
+        shown.append(blocks.tool_condition(_condition_at(snapshot, tool)))
+    yield from output.block_lines(shown)

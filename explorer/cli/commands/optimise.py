@@ -334,10 +334,7 @@ def outcome_lines(outcome: outcomes.Outcome, written: Sequence[Path]) -> Iterato
 def measure_rows(
     before: Measurements, after: Measurements
 ) -> Iterator[tuple[str, tuple[float | None, float | None]]]:
-    """Yield the label and the two values of each measure that the second design has.
-
-    A value may be infinite.
-    """
+    """Yield the label and the two values, which may be infinite, of the second one's measures."""
     for name in dict.fromkeys((*VARIABLES, *after.values)):
         new = after.value(name)
         if new is None:

@@ -13,9 +13,9 @@ import tyro
 
 from explorer.cli import options, output, values
 from explorer.errors import InputError
-from explorer.export.pose_tables import parse_table, read_poses
+from explorer.export.pose_tables import read_poses, read_table
 from explorer.export.tables import corners_csv, drives_csv, trajectory_csv
-from explorer.files.writing import check_writable, read_at_most
+from explorer.files.writing import check_writable
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
@@ -60,7 +60,7 @@ class TimedOptions(
     speed: Annotated[values.Positive, values.hint("default: a tenth of the reach")] = None
     """Speed of the fastest actuator, in design units per second."""
 
-    acceleration: Annotated[values.Positive, values.hint("optional")] = None
+    acceleration: Annotated[values.Positive, values.OPTIONAL] = None
     """Acceleration with which the fastest actuator reaches this speed, and stops at every corner,
     in design units per s²."""
 
@@ -129,15 +129,20 @@ class PathCommand(TimedOptions):
         loads = None
         if self.load is not None:
             loads = path_loads(design, path.poses, self.load, tool=tool)
-        texts = {self.corners: corners_csv(path.poses, tool), self.out: trajectory_csv(timed)}
-        files = {file: text.encode() for file, text in texts.items() if file is not None}
-        written, errors = options.write_files(files)
-        names = {self.out: "file", self.corners: "corners_file"}
-        rows = {self.out: f"{len(timed.time)} rows", self.corners: f"{len(path.poses)} corners"}
-        lines = [*_path_lines(design, path, timed, loads), *([""] if written else [])]
+        corners, count = corners_csv(path.poses, tool), len(path.poses)
+        files = {
+            file: (name, text, words)
+            for file, name, text, words in (
+                (self.corners, "corners_file", corners, f"{count} corners"),
+                (self.out, "file", trajectory_csv(timed), f"{len(timed.time)} rows"),
+            )
+            if file is not None
+        }
+        written, errors = options.write_files({f: row[1].encode() for f, row in files.items()})
+        lines = [*_path_lines(design, path, timed, loads), *[""] * bool(written)]
         self.write(
-            lambda: _path_json(path, timed, loads) | {names[file]: file for file in written},
-            [*lines, *(f"{rows[file]} in {file}" for file in written)],
+            lambda: _path_json(path, timed, loads) | {files[file][0]: file for file in written},
+            [*lines, *(f"{files[file][2]} in {file}" for file in written)],
             errors,
         )
 
@@ -164,22 +169,16 @@ def _path_json(
 
 
 def _path_lines(
-    design: Design,
-    path: planning.PlannedPath,
-    timed: Trajectory,
-    loads: PathLoads | None,
+    design: Design, path: planning.PlannedPath, timed: Trajectory, loads: PathLoads | None
 ) -> Iterator[str]:
     least = path_margins(path.poses, tool=path.tool).least
-    plural = "" if path.checked == 1 else "s"
+    plural, margin = "" if path.checked == 1 else "s", output.figure(path.margin)
     yield output.heading(design)
     yield from output.end_lines(design, path.poses[0], path.poses[-1], path.tool)
     rows = [
         ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
         ("length", f"{output.figure(path.length)} (root mean square of b1 to b4)"),
-        (
-            "keeps",
-            f"|δ| {output.figure(path.margin)}, clearance {output.figure(path.clearance)} or more",
-        ),
+        ("keeps", f"|δ| {margin}, clearance {output.figure(path.clearance)} or more"),
         ("planned in", f"{path.seconds:.3g} s, {path.checked} line{plural} tried"),
         ("takes", f"{output.figure(timed.duration)} s"),
         ("least |δ|", "  ".join(f"δ{i + 1} {output.figure(v)}" for i, v in enumerate(least))),
@@ -259,7 +258,7 @@ class DrivesCommand(TimedOptions):
             return start, goal
         if goal is not None or start != design.home_pose:
             raise InputError("--path has the ends: leave out --from, --to and their orientations")
-        table = parse_table(str(self.path), read_at_most(self.path), design.unit_mm)
+        table = read_table(self.path, design.unit_mm)
         if "time" in table.columns:
             raise InputError(
                 f"{self.path} has a column time, so it is a path in time already: give the "

@@ -91,9 +91,7 @@ class ForcesCommand(LoadOptions):
         if not np.isfinite(twists_of_actuators(found)).all():
             raise singular_error(pose, f"the {blocks.in_singular_pose(found)}")
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most
-        nearest = None
-        if found.share > 1.0:
-            nearest = nearest_carrying_pose(found)
+        nearest = nearest_carrying_pose(found) if found.share > 1.0 else None
         worst = forces.worst_direction(found, most)
         added = None if self.force is None else found.worst_force(self.force)
         self.write(
@@ -153,8 +151,7 @@ def _force_lines(
     yield f"load acts at          {'b4' if tool is None else 'the tool'}"
     facts = blocks.largest_loads(found)
     if added is not None:
-        more = blocks.worst_force(added, "the added force")
-        facts = facts.add(*more)
+        facts = facts.add(*blocks.worst_force(added, "the added force"))
     refused = (blocks.nearest_carrying(found, nearest, tool),) if found.share > 1.0 else ()
     yield from block_lines((blocks.verdict(found), *refused, *blocks.reaction_tables(found)))
     yield from block_lines((blocks.most_of_actuators(worst), facts))
@@ -180,9 +177,8 @@ class AccuracyCommand(options.TypicalOptions, LoadOptions):
         """Write the errors, the compliance and the deflection."""
         design = self.read_loaded_design()
         given = {"error_mm": self.errors, "stiffness_n_mm": self.stiffness}
-        design = options.replace_given(
-            design, actuators=options.replace_given(design.actuators, **given)
-        )
+        actuators = options.replace_given(design.actuators, **given)
+        design = options.replace_given(design, actuators=actuators)
         design, assumed = self.with_typical(design)
         pose, tool = self.pose(design), self.tool(design)
         found = loaded.ToolPrecision(loaded.LoadedPose(design, pose, self.load, point=tool or B4))
@@ -281,7 +277,13 @@ class BudgetCommand(options.JsonOptions, options.TypicalOptions, options.PoseOpt
         if found is not None and self.out is not None:
             files[self.out] = encode_design(budgets.with_tolerances(design, found.tolerances))
         written, errors = options.write_files(files)
-        table = [output.pose_table(design, pose, tool)] if over == "pose" else []
+        head = [output.heading(design), *output.assumed_lines(assumed)]
+        if over == "pose":
+            head.append(output.pose_table(design, pose, tool))
+        else:
+            head.append(f"worst over {costs.count:,} {WORDS[over]}, at one orientation")
+        if over == "workspace" and not design.limits.margin:
+            head.append("the limits demand no margin: nearer to singular poses errors are larger")
         self.write(
             lambda: {
                 "over": over,
@@ -291,8 +293,10 @@ class BudgetCommand(options.JsonOptions, options.TypicalOptions, options.PoseOpt
                 "out": next(iter(written), None),
             },
             chain(
-                [output.heading(design), *output.assumed_lines(assumed), *table],
-                self._as_lines(design, over, costs, found),
+                head,
+                block_lines(
+                    precision.tolerance_budget(costs, found, self.wanted, self.wanted_turn)
+                ),
                 ("", str(written[0])) if written else (),
             ),
             errors,
@@ -313,21 +317,6 @@ class BudgetCommand(options.JsonOptions, options.TypicalOptions, options.PoseOpt
         if any(low > high for low, high in zip(lows, highs, strict=True)):
             raise InputError("--required-box takes three lows, then highs above them")
         return over, (lows, highs)
-
-    def _as_lines(
-        self,
-        design: Design,
-        over: PositionSet,
-        costs: budgets.SourceCosts,
-        found: budgets.ToleranceBudget | None,
-    ) -> Iterator[str]:
-        if over != "pose":
-            yield f"worst over {costs.count:,} {WORDS[over]}, at one orientation"
-        if over == "workspace" and not design.limits.margin:
-            yield "the limits demand no margin: nearer to singular poses errors are larger"
-        yield from block_lines(
-            precision.tolerance_budget(costs, found, self.wanted, self.wanted_turn)
-        )
 
 
 def _budget_json(

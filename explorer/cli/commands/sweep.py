@@ -164,9 +164,8 @@ def progress_line(progress: Progress) -> str:
     text = f"{progress.done} of {progress.total} designs"
     if progress.rate > 0.0:
         text += f", {progress.rate:.3g}/s"
-    left = progress.seconds_left
-    if left:
-        text += f", {_duration(left)} left"
+    if progress.seconds_left:
+        text += f", {_duration(progress.seconds_left)} left"
     failed = progress.done - progress.counts.get("done", 0)
     return text + (f", {failed} not done" if failed else "")
 

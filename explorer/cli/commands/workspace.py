@@ -183,14 +183,8 @@ class WorkspaceCommand(
 class _Answer:
     """The measures of a workspace, as they are added: JSON, a table of volumes, lines below it.
 
-    Attributes:
-        values: Plain values by their keys.
-        volumes: Name, volume and remark of each row of the table.
-        lines: Lines of text below it.
-
-    Args:
-        case: Design and orientation, with the exact volume and the nodes of the workspace.
-        shift: Vector from b4 to the point whose workspace it is, shape (3,).
+    A row of the table is name, volume and remark; the shift (3,) leads from b4 to the point whose
+    workspace it is.
     """
 
     def __init__(self, case: Case, shift: FloatArray) -> None:
@@ -282,12 +276,8 @@ class _Answer:
 
 
 def _mesh_json(solid: Solid) -> dict[str, object]:
-    """Return the measures of a mesh as plain values."""
-    return {
-        "volume": solid.volume,
-        "triangles": len(solid.faces),
-        "watertight": solid.is_watertight,
-    }
+    sizes = {"volume": solid.volume, "triangles": len(solid.faces)}
+    return {**sizes, "watertight": solid.is_watertight}
 
 
 def _mesh_remark(solid: Solid) -> str:
