@@ -159,7 +159,7 @@ class PoseTable:
         raise InputError(f"{self.file}, line {line}, column {heading}: {cells[place]!r}: {needs}")
 
 
-def read_table(path: Path, unit_mm: float) -> Table:
+def read_table(path: Path, unit_mm: float) -> PoseTable:
     """Return the table in a CSV file, as `parse_table` does."""
     return parse_table(str(path), read_at_most(path), unit_mm)
 

@@ -33,21 +33,14 @@ PAPER_BOX = PRESETS["paper-optimal"].limits.box
 
 
 class Conflict(NamedTuple):
-    """A demand that no design within the bounds keeps.
-
-    The limit makes it impossible, such as "box" or "l1 maximum"; the message is a clause with the
-    demand and the most that the limit allows.
-    """
+    """A demand that a limit, such as "box" or "l1 maximum", makes impossible, in a clause."""
 
     limit: str
     message: str
 
 
 def find_conflicts(problem: problems.Problem, unit: Unit = UNITS) -> tuple[Conflict, ...]:
-    """Return the reasons why no design within the bounds meets the demands, one for each limit.
-
-    Their words have lengths in the unit.
-    """
+    """Return why no design within the bounds meets the demands, one conflict for each limit."""
     intervals, found = Intervals(problem, unit), dict[str, Conflict]()
     for find in (_of_volume, _of_lengths, _of_required_box, _of_margins):
         for conflict in find(intervals):
@@ -137,10 +130,8 @@ def needed_lengths(intervals: Intervals, required: problems.Box) -> dict[str, fl
         "d4": intervals.in_base([*intervals.of("b3"), still])[1:],
         "l4": np.array([*-intervals.of("a3x", "a3y")[:, ::-1], still]),
     }
-    middle, half = (
-        0.5 * (lows + highs)[:, None] + intervals.of(*problems.SHIFTS),
-        0.5 * (highs - lows),
-    )
+    half, shifts = 0.5 * (highs - lows), intervals.of(*problems.SHIFTS)
+    middle = 0.5 * (lows + highs)[:, None] + shifts
     return {
         name: math.hypot(*(half[-len(arm) :] + _smallest(middle[-len(arm) :] + arm)))
         for name, arm in arms.items()
@@ -184,9 +175,8 @@ def _of_lengths(intervals: Intervals) -> Iterator[Conflict]:
     longest = max(intervals.maximum(name)[1] for name in LENGTHS)
     if demanded is not None and longest > demanded * (1.0 + SPARE):
         least, most = format_apart((longest, demanded), 6, unit.text)
-        yield Conflict(
-            LONGEST_LEG, f"the longest leg is at least {least}, and {most} are asked for"
-        )
+        words = f"the longest leg is at least {least}, and {most} are asked for"
+        yield Conflict(LONGEST_LEG, words)
     apart = float(np.abs(intervals.apart).max())
     if apart < gap * (1.0 - SPARE):
         most, least = format_apart((apart, gap), 4, unit.text)
@@ -212,9 +202,8 @@ def _of_required_box(intervals: Intervals) -> Iterator[Conflict]:
         limit, _, most = intervals.maximum(name)
         if needed > most * (1.0 + SPARE):
             up, end = format_apart((needed, most), 4, unit.text)
-            yield Conflict(
-                limit, f"the required box needs {name} up to {up}, and the {limit} is {end}"
-            )
+            words = f"the required box needs {name} up to {up}, and the {limit} is {end}"
+            yield Conflict(limit, words)
 
 
 def _of_margins(intervals: Intervals) -> Iterator[Conflict]:

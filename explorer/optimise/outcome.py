@@ -239,20 +239,19 @@ def reached_text(problem: Problem, best: Iterate) -> str:
 def record_of(outcome: Outcome, settings: Settings) -> Record:
     """Return the record of an optimisation that was run with these settings."""
     problem, shared = outcome.problem, RunSummary.__struct_fields__
-    runs = [
-        RunRecord(
-            **{name: getattr(run, name) for name in shared},
-            message=run.words(reached_text(problem, run.best)),
-            best=run.best.number,
-        )
-        for run in outcome.runs
-    ]
     return Record(
         problem=problem,
         settings=settings,
         design=outcome.design,
         chosen=outcome.chosen,
-        runs=tuple(runs),
+        runs=tuple(
+            RunRecord(
+                **{name: getattr(run, name) for name in shared},
+                message=run.words(reached_text(problem, run.best)),
+                best=run.best.number,
+            )
+            for run in outcome.runs
+        ),
         history=msgspec.convert(outcome.history, tuple[IterateRecord, ...], from_attributes=True),
         seconds=outcome.seconds,
         versions=versions(),

@@ -269,11 +269,7 @@ def distances_of(design: Design) -> dict[str, float]:
 
 
 def start_value(start: Design, name: str) -> float:
-    """Return the value of a variable in a design.
-
-    Raises:
-        InputError: No such variable.
-    """
+    """Return the value of a variable in a design; an InputError if there is none of the name."""
     if name in VARIABLES:
         return start.variables[VARIABLES.index(name)]
     if name == YAW:

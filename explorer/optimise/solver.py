@@ -56,7 +56,7 @@ def optimise_design(
         for values in (problem.start_values, *more_starts(problem, starts - 1, seed)):
             trail.run = len(runs)
             best = runs[_best(runs, trail)] if runs else None
-            to_beat = best.best if best is not None and best.status == "converged" else None
+            to_beat = best.best if best and best.status == "converged" else None
             runs.append(Search(problem, values, iterations, trail, to_beat).run())
             done = problem.objective == "match-volume" and runs[-1].status == "converged"
             if done or trail.is_cancelled:

@@ -56,7 +56,5 @@ def measure_claims(
         if report is not None:
             report(claim.title)
         measured = claim.measure()
-        yield Result(
-            claim,
-            replace(measured, text=claim.found.format(**{**measured.values, **measured.words})),
-        )
+        text = claim.found.format(**{**measured.values, **measured.words})
+        yield Result(claim, replace(measured, text=text))

@@ -24,8 +24,8 @@ OPTIMAL = PRESETS["paper-optimal"]
 # each actuator, as the legs of the others have: the guide goes from a1 to a2.
 STROKES = OPTIMAL.with_limits(box=None, guide=(0.0, OPTIMAL.reach))
 FREE = msgspec.structs.replace(STROKES, home=OPTIMAL.home_pose)
-A2X = (10.0, OPTIMAL.reach)
-"""Positions of a2 at which the twin is measured, in design units."""
+TWINS = [six_four_twin(OPTIMAL, a2x) for a2x in (10.0, OPTIMAL.reach)]
+"""The twin at two positions of a2, in design units."""
 SIZES = (0.75, 1.0, 1.5)
 """Factors of the base of the octahedral platform."""
 
@@ -68,7 +68,7 @@ def measure_workspaces() -> Measurement:
     """Compare the volume of the 4-4's workspace with those of six-legged mechanisms."""
     exact = workspace_volume(FREE).volume / OPTIMAL.reach**3
     ours = RelativeVolume("4-4", exact, 0.0)
-    twins = [_workspace(each) for each in _twins()]
+    twins = [_workspace(each) for each in TWINS]
     octahedra = [_workspace(octahedral(OPTIMAL, size)) for size in SIZES]
     others = (*twins, *octahedra)
     lines = [f"{'':18}{'volume/reach³':>14}{'error':>8}"]
@@ -99,7 +99,7 @@ def measure_orientations() -> Measurement:
     crossed = _abilities("4-4, any order", in_any_order, points, rotation)
     others = [
         _abilities(each.name, each.holds, qmc.scale(_points(0), *each.box), each.home[1])
-        for each in (*_twins(), octahedral(OPTIMAL))
+        for each in (*TWINS, octahedral(OPTIMAL))
     ]
     lines = [f"{'':18}{'mean share':>12}{'error':>8}{'mean tilt':>11}{'error':>8}"]
     lines += [
@@ -137,10 +137,6 @@ def in_any_order(position: FloatArray, rotation: FloatArray) -> BoolArray:
     return within.all(axis=-1) & (mode_of(margins(position, rotation)) == mode)
 
 
-def _twins() -> list[SixLegs]:
-    return [six_four_twin(OPTIMAL, a2x) for a2x in A2X]
-
-
 def _points(seed: int) -> FloatArray:
     """Return scrambled points of the sequence of Sobol in the unit cube, shape (n, 3)."""
     return qmc.Sobol(3, rng=np.random.default_rng([10, seed])).random_base2(POINTS_LOG2)
@@ -149,12 +145,9 @@ def _points(seed: int) -> FloatArray:
 def _workspace(mechanism: SixLegs) -> RelativeVolume:
     """Return the volume of a mechanism by several sets of points in a box about its workspace."""
     lows, highs = mechanism.box
-    rotation = mechanism.home[1]
     size = float(np.prod(highs - lows)) / OPTIMAL.reach**3
-    shares = [
-        float(mechanism.holds(qmc.scale(_points(seed), lows, highs), rotation).mean())
-        for seed in range(SETS)
-    ]
+    sets = (qmc.scale(_points(seed), lows, highs) for seed in range(SETS))
+    shares = [float(mechanism.holds(points, mechanism.home[1]).mean()) for points in sets]
     error = float(np.std(shares, ddof=1)) / SETS**0.5
     return RelativeVolume(mechanism.name, size * float(np.mean(shares)), size * error)
 
@@ -166,11 +159,9 @@ def _abilities(name: str, holds: Holds, points: FloatArray, rotation: FloatArray
     turns = np.asarray(Rotation.random(ORIENTATIONS, rng=np.random.default_rng(10)).as_matrix())
     shares = np.array([holds(np.tile(p, (len(turns), 1)), turns).mean() for p in chosen])
     tilts = np.array([_greatest_tilt(holds, p, rotation) for p in chosen])
-    values = [
-        (float(each.mean()), float(each.std(ddof=1)) / len(chosen) ** 0.5)
-        for each in (shares, tilts)
-    ]
-    return Abilities(name, *values[0], *values[1])
+    root = len(chosen) ** 0.5
+    both = [(float(each.mean()), float(each.std(ddof=1)) / root) for each in (shares, tilts)]
+    return Abilities(name, *both[0], *both[1])
 
 
 def _greatest_tilt(holds: Holds, position: FloatArray, rotation: FloatArray) -> float:

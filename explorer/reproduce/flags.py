@@ -43,13 +43,8 @@ def measure_strata() -> claim.Measurement:
     order = {(w, other) for w in STRATA for other in STRATA if is_below(w, other)}
     outside, missing = len(neighbours - order), len(order - neighbours)
     counts = [sum(inversions(w) == k for w in STRATA) for k in range(7)]
-    words = {
-        "strata": len(STRATA),
-        "counts": ", ".join(map(str, counts)),
-        "poses": len(at),
-        "pairs": len(neighbours),
-        "order": len(order),
-    }
+    words = {"strata": len(STRATA), "counts": ", ".join(map(str, counts)), "poses": len(at)}
+    words |= {"pairs": len(neighbours), "order": len(order)}
     values = {"found": len(found), "by_dimension": counts, "outside": outside, "missing": missing}
     return claim.judge(len(found) == len(STRATA) and neighbours == order, words, values)
 
@@ -112,9 +107,7 @@ def _rates_of_freedoms(positions: FloatArray, rotations: FloatArray) -> float:
     for column in (claim.PHI1, claim.PHI2, claim.PHI3):
         p, r = claim.flatten(positions, rotations, column)
         guide = np.broadcast_to([1.0, 0.0, 0.0], p.shape)
-        axis = {claim.PHI1: r[..., 0], claim.PHI2: p / lengths_of(p)[:, None], claim.PHI3: guide}[
-            column
-        ]
+        axis = (r[..., 0], p / lengths_of(p)[:, None], guide)[column - claim.PHI1]
         # b4 lies on the first two lines; the third passes through a1.
         velocity = np.cross(axis, p) if column == claim.PHI3 else np.zeros_like(p)
         twist = np.concatenate([velocity, axis], axis=-1)
@@ -177,16 +170,15 @@ def measure_charts() -> claim.Measurement:
     free = np.repeat([np.isin(range(6), columns) for columns in STRATUM_FOLDS], PLACES, axis=0)
     of_strata = claim.random_folds(random, free)
     poses = from_folds(of_strata)
-    found = stratum(*poses, 1.0).reshape(-1, PLACES, 4)
+    places = stratum(*poses, 1.0).reshape(-1, PLACES, 4)
     ours = {
         tuple(rows[0].tolist())
-        for rows, columns in zip(found, STRATUM_FOLDS, strict=True)
+        for rows, columns in zip(places, STRATUM_FOLDS, strict=True)
         if (rows == rows[0]).all() and inversions(tuple(rows[0])) == len(columns)
     }
+    back = zip(from_folds(folds), (p, r), strict=True)
     errors = {
-        "poses": max(
-            float(np.abs(a - b).max()) for a, b in zip(from_folds(folds), (p, r), strict=True)
-        ),
+        "poses": max(float(np.abs(found - given).max()) for found, given in back),
         "folds": _error_of_folds(of_strata, to_folds(*poses)),
         "motions": _error_of_motions(claim.random_folds(random, np.full((MADE, 6), True))),
         "margins": float(np.abs(products - margins(p, r)).max()),

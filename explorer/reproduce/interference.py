@@ -49,15 +49,10 @@ Collides = Callable[[FloatArray, FloatArray], BoolArray]
 
 @dataclass(frozen=True)
 class LegCollisions:
-    """The clearances and collisions of the legs of a mechanism over a workspace.
+    """The clearances of thin legs of a mechanism over a workspace, and shares of its nodes.
 
-    Attributes:
-        name: Name of the mechanism.
-        least: Least clearance of thin legs, in design units, by the least z, as in `LOWEST`.
-        median: Median over the nodes of the least clearance of thin legs.
-        clearer: Share of the nodes at which it is clearer than the 4-4; None for the 4-4 itself.
-        free: Shares of the nodes without a collision, by the radius of all legs, as in `RADII`.
-        steps: Shares of colliding steps by their length, as in `STEPS`, and by axis.
+    The least clearances are by the least z (`LOWEST`). The shares are those of nodes clearer than
+    with the 4-4, of nodes without a collision (`RADII`), and of colliding steps (`STEPS`, axes).
     """
 
     name: str
@@ -122,7 +117,7 @@ def measure_optimum() -> Measurement:
     clearance = leg_clearances(Configuration(OPTIMAL, of_table, ROTATION)).clearance.min(axis=1)
     touching = of_table[clearance < TOUCHING]
     steps = _shares_of_steps(nodes, _four_collides)
-    highest = float(touching[:, 2].max(initial=0.0))
+    touches = {"nodes": len(of_table), "highest": float(touching[:, 2].max(initial=0.0))}
     lines = [f"{'step':>8}" + "".join(f"{axis:>8}" for axis in "xyz")]
     for length, shares in zip(STEPS, steps, strict=True):
         lines.append(f"{length:8g}" + "".join(f"{share:8.1%}" for share in shares))
@@ -133,13 +128,12 @@ def measure_optimum() -> Measurement:
         "longest": longest,
         "steps": (STEPS[0], STEPS[-1]),
         "touching": len(touching),
-        "nodes": len(of_table),
-        "highest": highest,
+        **touches,
     }
     values = {
         "steps": dict(zip(map(str, STEPS), steps, strict=True)),
         "apart": apart,
-        "touching": {"count": len(touching), "nodes": len(of_table), "highest": highest},
+        "touching": {"count": len(touching), **touches},
     }
     if shortest < RARE < longest:
         return Measurement("not testable from the paper", words, values, tuple(lines))
@@ -164,15 +158,12 @@ def _interference(
 def _shares_of_steps(nodes: FloatArray, collides: Collides) -> tuple[tuple[float, ...], ...]:
     """Return the shares of colliding steps from nodes, by length as in `STEPS` and by axis."""
     starts = nodes[nodes[:, 2] >= FROM]
-    found: list[tuple[float, ...]] = []
-    for length in STEPS:
-        shares: list[float] = []
-        for axis in np.eye(3):
-            ends = starts + length * axis
-            within = _within(ends)
-            shares.append(float(collides(starts[within], ends[within]).mean()))
-        found.append(tuple(shares))
-    return tuple(found)
+
+    def share(step: FloatArray) -> float:
+        within = _within(starts + step)
+        return float(collides(starts[within], (starts + step)[within]).mean())
+
+    return tuple(tuple(share(length * axis) for axis in np.eye(3)) for length in STEPS)
 
 
 def _four_collides(start: FloatArray, end: FloatArray) -> BoolArray:

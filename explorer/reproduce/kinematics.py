@@ -77,9 +77,8 @@ def measure_same_kinematics() -> claim.Measurement:
             constant = float(np.median(own / product))
             off = (modes - given, back - joints, (own / constant - product) / design.reach**2)
             errors = np.maximum(errors, [np.abs(each).max() / design.reach for each in off])
-    values: dict[str, float] = dict(
-        zip(("lengths", "joints", "determinant"), errors.tolist(), strict=True)
-    )
+    names = ("lengths", "joints", "determinant")
+    values: dict[str, float] = dict(zip(names, errors.tolist(), strict=True))
     words = {name: claim.below(value, EXACT) for name, value in values.items()} | {
         "poses": POSES,
         "designs": len(PRESETS) + DESIGNS,
@@ -136,13 +135,9 @@ def _volumes(design: Design, position: FloatArray, rotation: FloatArray) -> Floa
         (at.a1, at.a2, at.b2, at.b3),
         (at.b4, at.a1, at.a2, at.a3),
     )
-    return np.stack(
-        [
-            np.abs(np.linalg.det(np.stack(np.broadcast_arrays(q - o, r - o, s - o), axis=-1))) / 6.0
-            for o, q, r, s in tetrahedra
-        ],
-        axis=-1,
-    )
+    edges = (np.broadcast_arrays(q - o, r - o, s - o) for o, q, r, s in tetrahedra)
+    products = [np.linalg.det(np.stack(each, axis=-1)) for each in edges]
+    return np.abs(np.stack(products, axis=-1)) / 6.0
 
 
 def measure_mode_paths() -> claim.Measurement:
@@ -190,8 +185,7 @@ def random_paths(random: np.random.Generator, count: int) -> tuple[FloatArray, .
 def conditions_at_crossings(*paths: FloatArray) -> FloatArray:
     """Return the inverse condition of J where a margin changes its sign on each path, shape (n,).
 
-    The paths are as of `paths_at`. It is the first margin whose signs at both ends differ. Without
-    one the end of the path counts.
+    It is the first margin whose signs at both ends differ; without one the end of the path counts.
     """
     rows = np.arange(len(paths[0]))
 

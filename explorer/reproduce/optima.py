@@ -54,34 +54,23 @@ class Row:
     nodes: volume.NodeCount
     exact: float
 
-    @property
-    def off(self) -> float:
-        """Largest difference of an extent from the printed one."""
-        return float(np.abs(np.subtract(_extent(self.nodes), PRINTED[self.preset].extent)).max())
-
 
 def measure_table() -> Measurement:
     """Count the nodes of both designs by our reading, and compare extents and volume."""
+    given = {name: Workspace(PRESETS[name]) for name in PRINTED}
     rows = [
-        Row(
-            name,
-            volume.node_count_of(Workspace(PRESETS[name])),
-            volume.workspace_volume(PRESETS[name]).volume,
-        )
-        for name in PRINTED
+        Row(name, volume.node_count_of(each), volume.workspace_volume(each.design).volume)
+        for name, each in given.items()
     ]
     optimal, initial = PRESETS["paper-optimal"], PRESETS["paper-initial"]
     by_yaw = {
-        yaw: (
-            volume.node_count_of(Workspace(with_values(optimal, {YAW: yaw}))).count,
-            _initial_off(initial, yaw),
-        )
+        yaw: (_nodes_at(optimal, yaw).count, _off("paper-initial", _nodes_at(initial, yaw)))
         for yaw in YAWS
     }
     as_scanned = msgspec.structs.replace(initial, b3=15.0, home=initial.home_pose)
-    off = min(_initial_off(as_scanned, yaw) for yaw in range(-180, 180))
+    off = min(_off("paper-initial", _nodes_at(as_scanned, yaw)) for yaw in range(-180, 180))
     beyond = _beyond_box(optimal)
-    worst, last = max(row.off for row in rows), rows[-1]
+    worst, last = max(_off(row.preset, row.nodes) for row in rows), rows[-1]
     excess = last.nodes.volume - last.exact
     why = (
         "A node on the boundary counts as a whole cell, so that cells stand out of the workspace. "
@@ -129,10 +118,9 @@ def _beyond_box(design: Design) -> float:
     """Return half a step times the area of the faces of the box on which nodes lie."""
     step = volume.node_step_of(design)
     gradient = volume.workspace_volume(design).gradient
-    faces = [name for name in gradient if name.startswith("box ")]
     lows, highs = design.limits.box or ((), ())
     area = 0.0
-    for name in faces:
+    for name in filter(lambda name: name.startswith("box "), gradient):
         _, axis, end = name.split()
         bound = (lows if end == "minimum" else highs)["xyz".index(axis)]
         if abs(bound / step - round(bound / step)) < ON_NODE:
@@ -144,11 +132,13 @@ def _extent(nodes: volume.NodeCount) -> Extent:
     return nodes.extent or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-def _initial_off(design: Design, yaw: float) -> float:
-    """Return the largest difference of an extent at a yaw from that of the initial row."""
-    return Row(
-        "paper-initial", volume.node_count_of(Workspace(with_values(design, {YAW: yaw}))), 0.0
-    ).off
+def _nodes_at(design: Design, yaw: float) -> volume.NodeCount:
+    return volume.node_count_of(Workspace(with_values(design, {YAW: yaw})))
+
+
+def _off(preset: str, nodes: volume.NodeCount) -> float:
+    """Return the largest difference of the extent of nodes from the printed one of a preset."""
+    return float(np.abs(np.subtract(_extent(nodes), PRINTED[preset].extent)).max())
 
 
 def _lines(row: Row) -> list[str]:
@@ -217,18 +207,10 @@ def measure_search() -> Measurement:
         ("smallest reach, interference off", defaults.reach_problem(), STARTS),
         ("smallest reach, interference on", defaults.reach_problem(defaults.CLEARANCE), STARTS),
     ):
-        outcome = optimise_design(problem, starts=starts)
-        objective = outcome.best.objective if problem.objective == "match-volume" else None
-        optima.append(
-            Optimum(
-                name,
-                measure(outcome.design),
-                outcome.iterations,
-                objective,
-                outcome.converged,
-                starts,
-            )
-        )
+        found = optimise_design(problem, starts=starts)
+        objective = found.best.objective if problem.objective == "match-volume" else None
+        result = measure(found.design), found.iterations, objective, found.converged
+        optima.append(Optimum(name, *result, starts))
     paper, matches = optima[1], [each for each in optima[2:] if each.objective is not None]
     exact = abs(1.0 - (paper.measured["volume"] or 0.0) / defaults.PAPER_VOLUME)
     smallest = min(each.measured["reach"] or 0.0 for each in optima if each.starts > 1)

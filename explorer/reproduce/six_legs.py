@@ -60,13 +60,9 @@ class SixLegs:
     @cached_property
     def pairs(self) -> IntArray:
         """The pairs of legs that share no joint, shape (m, 2)."""
-        base, platform = self.base, self.platform
-
-        def share_joint(i: int, j: int) -> bool:
-            return (base[i] == base[j]).all() or (platform[i] == platform[j]).all()
-
+        ends = self.base, self.platform
         pairs = itertools.combinations(range(6), 2)
-        return np.array([(i, j) for i, j in pairs if not share_joint(i, j)])
+        return np.array([(i, j) for i, j in pairs if all((p[i] != p[j]).any() for p in ends)])
 
     def lengths(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Return the lengths of the legs, shape (n, 6)."""
@@ -76,8 +72,7 @@ class SixLegs:
     def axes(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Return both ends of each leg, shape (n, 6, 2, 3)."""
         tips = position[:, None, :] + np.einsum("...ij,kj->...ki", rotation, self.platform)
-        base = np.broadcast_to(self.base, tips.shape)
-        return np.stack([base, tips], axis=-2)
+        return np.stack([np.broadcast_to(self.base, tips.shape), tips], axis=-2)
 
     def clearances(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Return the distances of the axes of the pairs, shape (n, m)."""

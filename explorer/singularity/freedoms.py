@@ -63,9 +63,8 @@ class UncoupledMotion:
     @property
     def name(self) -> str:
         """The motion's name, such as "along the platform's x"."""
-        return (
-            f"{'along' if self.kind == 'translation' else 'about'} the {self.frame}'s {self.axis}"
-        )
+        how = "along" if self.kind == "translation" else "about"
+        return f"{how} the {self.frame}'s {self.axis}"
 
     def line(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
         """Return a point on the axis and its unit direction, shape (3,) each, in the base frame."""
@@ -197,10 +196,9 @@ def _free(locked: FloatArray) -> FloatArray:
 
 
 def _locked_rates(c: Configuration) -> FloatArray:
-    """Return the rates that locked actuators hold at zero, by the twist (v over the reach; ω).
+    """Return the rates that locked actuators hold at zero by the twist (v over the reach; ω).
 
-    They are those of the joints over the reach and, for a leg of length zero, the velocity of its
-    end, shape (6 or more, 6).
+    They are those of joints and of ends of legs of length zero, shape (6 or more, 6).
     """
     rows = [c.jacobian]
     for arm, length in zip(c.joint_arms[LENGTH_ROWS], c.leg_lengths, strict=True):

@@ -130,11 +130,9 @@ def nearest_in_strata(
                 nearest[w], exact[w] = singular.pose, float(singular.distance)
     positions = np.array([each.position for each in nearest.values()])
     rotations = np.array([each.rotation for each in nearest.values()])
-    ways: list[float] = displacement(
-        design, pose.position, pose.rotation, positions, rotations
-    ).tolist()
+    ways = displacement(design, pose.position, pose.rotation, positions, rotations)
     for (w, goal), way in zip(nearest.items(), ways, strict=True):
-        found[w] = NearestInStratum(w, exact.get(w, way), goal)
+        found[w] = NearestInStratum(w, exact.get(w, float(way)), goal)
     return {w: found[w] for w in strata}
 
 
@@ -195,7 +193,6 @@ class _Target:
 
 
 def _contract(basis: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Return the coefficients (3, 3, 3) of the sum of the products of entries with a matrix's."""
     return np.einsum("abcij,ij->abc", basis, matrix)
 
 
@@ -214,23 +211,19 @@ def _rotation_coefficients(axes: str, flip: str) -> FloatArray:
 
 
 def _nearest_poses(design: Design, pose: Pose, strata: Sequence[Stratum]) -> list[Pose]:
-    """Return the nearest poses in the closures of strata of codimension two or more."""
     platform = PlatformPoints.of(design)
     unit, rotation = platform.length, pose.rotation
     centroid = platform.centroid / unit
     goal = np.array(pose.position) / unit + rotation @ centroid
     target = _Target(centroid, goal, rotation @ platform.scatter / unit**2)
-    problems: list[tuple[Stratum, str]] = []
-    terms: list[tuple[FloatArray, float]] = []
-    starts: list[FloatArray] = []
-    for w in strata:
-        closure = _CLOSURES[w]
-        for flip in closure.flips:
-            problems.append((w, flip))
-            terms.append(target.coefficients(closure, flip))
-            starts.append(grid_minima(*terms[-1], len(closure.axes)))
+    problems = [(w, flip) for w in strata for flip in _CLOSURES[w].flips]
     if not problems:
         return []
+    terms = [target.coefficients(_CLOSURES[w], flip) for w, flip in problems]
+    starts = [
+        grid_minima(*each, len(_CLOSURES[w].axes))
+        for each, (w, _) in zip(terms, problems, strict=True)
+    ]
     which = np.repeat(np.arange(len(problems)), [len(each) for each in starts])
     coefficients = np.array([each for each, _ in terms])[which]
     angles = np.concatenate(starts)
@@ -240,15 +233,10 @@ def _nearest_poses(design: Design, pose: Pose, strata: Sequence[Stratum]) -> lis
         w, flip = problems[which[index]]
         if w not in best:
             closure, at = _CLOSURES[w], angles[index]
-            turn = _rotation(closure.axes, flip, at)
+            basis = _rotation_coefficients(closure.axes, flip)
+            turn = np.einsum("abcij,a,b,c->ij", basis, *powers_of(at)[:, 0])
             best[w] = Pose.of(unit * target.position(closure.place, at, turn), turn)
     return [best[w] for w in strata]
-
-
-def _rotation(axes: str, flip: str, angles: FloatArray) -> FloatArray:
-    """Return the product of turns by angles (3,) and a half turn."""
-    a, b, c = powers_of(angles)[:, 0]
-    return np.einsum("abcij,a,b,c->ij", _rotation_coefficients(axes, flip), a, b, c)
 
 
 # Number of grid angles in a turn, largest number of Newton steps, and the last step in radians.

@@ -59,11 +59,8 @@ class SearchDemand(ABC):
     def measure(self, state: SearchState) -> Measured:
         """Return the values and their derivatives."""
 
-    def find_unproven(self, state: SearchState) -> list[Proof]:
-        """Return what is not proven at a state, and look at its poses too from now on.
-
-        There is nothing to prove of a demand that `measure` decides exactly.
-        """
+    def look_at_unproven(self, state: SearchState) -> list[Proof]:
+        """Look from now on at the poses of what is not proven at a state too, and return it."""
         del state
         return []
 
@@ -72,8 +69,7 @@ class VolumeDemand(SearchDemand):
     """The volume of the workspace, exactly or at least, by its nearly linear cube root."""
 
     def __init__(self, volume: float, *, is_equality: bool) -> None:
-        self.volume = volume
-        self.is_equality = is_equality
+        self.volume, self.is_equality = volume, is_equality
         self.names = (CATALOGUE["volume"].label,)
 
     def measure(self, state: SearchState) -> Measured:
@@ -210,8 +206,8 @@ class BoxDemand(SearchDemand):
         reserve = 0.0 if self.tilt is None else RESERVE
         return Measured(np.concatenate(values) / size - reserve, np.vstack(gradients) / size)
 
-    def find_unproven(self, state: SearchState) -> list[Proof]:
-        """Return the limits that are missed, or not proven, at a tilt, and look there for each."""
+    def look_at_unproven(self, state: SearchState) -> list[Proof]:
+        """Look from now on at the tilts where limits are missed or not proven, and return these."""
         if self.tilt is None:
             return []
         over = BoxLimits(state.design, state.box, state.rotation)

@@ -98,8 +98,7 @@ class ClearanceDemand(SearchDemand):
     names = tuple(f"clearance of legs {first} and {second}" for first, second in PAIRS)
 
     def __init__(self, clearance: float, positions: FloatArray) -> None:
-        self.clearance = clearance
-        self.positions = positions
+        self.clearance, self.positions = clearance, positions
 
     def measure(self, state: SearchState) -> Measured:
         """Return the bounds of the six pairs over the clearance, and their derivatives."""
@@ -129,8 +128,8 @@ class ClearanceDemand(SearchDemand):
         pair = int(least.argmin())
         return float(least[pair]), self.names[pair]
 
-    def find_unproven(self, state: SearchState) -> list[Proof]:
-        """Return the pairs that are, or may be, too near in the workspace, and look there too."""
+    def look_at_unproven(self, state: SearchState) -> list[Proof]:
+        """Look from now on at where pairs come nearest too, and return those not proven apart."""
         least = least_clearances(
             state.workspace,
             BETWEEN * self.clearance,
@@ -275,8 +274,8 @@ class StaticsDemand(SearchDemand):
         values, gradients = spare[rows, parts], slopes[rows, parts]
         return Measured(values.ravel() - RESERVE, gradients.reshape(-1, slopes.shape[-1]))
 
-    def find_unproven(self, state: SearchState) -> list[Proof]:
-        """Return what is, or may be, too large in the required box, and look there too."""
+    def look_at_unproven(self, state: SearchState) -> list[Proof]:
+        """Look from now on at where something is, or may be, too large too, and return it."""
         most = self.most
         if not self.is_given:
             most = (1.0 + TOLD) * state.statics.worst(self.amounts(state.statics)) or most

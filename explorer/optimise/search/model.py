@@ -7,7 +7,7 @@ all of them, which keeps the functions smooth.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -61,35 +61,37 @@ class SearchModel:
         self._before_each = before_each
         u = np.array(start) / scales(problem)
         here = SearchState(problem, u)
-        self.demands: list[demands.SearchDemand] = _demands(problem, here)
-        clearance = problem.demands.clearance
-        self._clearance: grid_demands.ClearanceDemand | None = None
-        if clearance is not None:
-            positions = grid_demands.first_positions(problem, here.design)
-            self._clearance = grid_demands.ClearanceDemand(clearance, positions)
+        self.demands: list[demands.SearchDemand] = [*_demands(problem, here)]
         # The last one, see `_demands`.
         self._raised = self.demands[-1] if problem.objective in OVER_BOX else None
         if self._raised is not None:
             least = float(self._raised.measure(here).values.min())
             u = np.append(u, least if math.isfinite(least) else -MISSED)
-        if self._clearance is not None and not is_relaxed:
-            self.demands.append(self._clearance)
+        self._left_out: grid_demands.ClearanceDemand | None = None
+        clearance = problem.demands.clearance
+        if clearance is not None:
+            positions = grid_demands.first_positions(problem, here.design)
+            demand = grid_demands.ClearanceDemand(clearance, positions)
+            if is_relaxed:
+                self._left_out = demand
+            else:
+                self.demands.append(demand)
         self.start: FloatArray = u
         self._volume = problem.demands.volume or here.volume or problem.size**3
         self._last: Evaluation | None = None
         self.evaluations = 0
 
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """The names of all demands, m of them."""
         return tuple(name for demand in self.demands for name in demand.names)
 
-    @cached_property
+    @property
     def equalities(self) -> BoolArray:
         """Which demands are equalities, shape (m,), boolean."""
         return np.array([each.is_equality for each in self.demands for _ in each.names], dtype=bool)
 
-    @cached_property
+    @property
     def limits(self) -> BoolArray:
         """Which demands are limits of the design, shape (m,), boolean."""
         return np.array([each.is_limit for each in self.demands for _ in each.names], dtype=bool)
@@ -100,21 +102,18 @@ class SearchModel:
         bounds = bounds_of(self.problem)
         return bounds if self._raised is None else np.vstack([bounds, UNBOUNDED])
 
-    def find_unproven(self, at: Evaluation) -> list[Proof]:
-        """Return what is not proven at a place, and look at its poses too from now on."""
+    def look_at_unproven(self, at: Evaluation) -> list[Proof]:
+        """Look from now on at the poses of what is not proven at a place too, and return it."""
         found: list[Proof] = []
         for demand in self.demands:
             self._before_each()
-            found += demand.find_unproven(at.state)
-        for name in ("names", "equalities", "limits"):
-            self.__dict__.pop(name, None)
+            found += demand.look_at_unproven(at.state)
         self._last = None
         return found
 
     def unproven_clearance(self, at: Evaluation) -> list[Proof]:
         """Return what is not proven of the clearance that a relaxed problem leaves out."""
-        left_out = self._clearance if self.is_relaxed else None
-        return left_out.find_unproven(at.state) if left_out else []
+        return self._left_out.look_at_unproven(at.state) if self._left_out else []
 
     def at(self, u: FloatArray) -> Evaluation:
         """Return the evaluation at scaled variables; the last one is remembered.
@@ -173,8 +172,7 @@ class SearchModel:
     def worst(self, at: Evaluation) -> tuple[float, str]:
         """Return value and name of the inequality that is missed most or has the least to spare.
 
-        The value is below zero only where the inequality is missed by more than its tolerance:
-        that of all limits for the limits of the design, `MET` for the other demands.
+        The value is below zero only if it is missed by more than the tolerance of limits, or `MET`.
         """
         if self.equalities.all():
             return 0.0, ""
@@ -187,9 +185,9 @@ class SearchModel:
     def worst_of_all(self, at: Evaluation) -> tuple[float, str]:
         """Return what `worst` does with the clearance too, at its positions, if it is left out."""
         spare, name = self.worst(at)
-        if self._clearance is None or not self.is_relaxed:
+        if self._left_out is None:
             return spare, name
-        least, pair = self._clearance.worst(at.state)
+        least, pair = self._left_out.worst(at.state)
         return (spare, name) if spare <= max(least, -demands.MET) else (least, pair)
 
 
@@ -216,39 +214,38 @@ def reported_objective(problem: Problem, state: SearchState) -> float:
     return state.statics.worst(values)
 
 
-def _demands(problem: Problem, start: SearchState) -> list[demands.SearchDemand]:
-    wanted = problem.demands
-    listed: list[demands.SearchDemand] = []
+def _demands(problem: Problem, start: SearchState) -> Iterator[demands.SearchDemand]:
+    """Yield the demands of a problem; what the objective raises comes last."""
+    wanted, objective = problem.demands, problem.objective
     if wanted.volume is not None:
-        exact = problem.objective == "match-volume"
-        listed.append(demands.VolumeDemand(wanted.volume, is_equality=exact))
+        yield demands.VolumeDemand(wanted.volume, is_equality=objective == "match-volume")
     if wanted.reach is not None:
-        listed.append(demands.ReachDemand(wanted.reach))
+        yield demands.ReachDemand(wanted.reach)
     if wanted.least > 0.0:
-        listed.append(demands.DegenerateDemand(wanted.least, start))
+        yield demands.DegenerateDemand(wanted.least, start)
     if start.design.limits.gap > 0.0:
-        listed.append(demands.GapDemand(start))
+        yield demands.GapDemand(start)
     if wanted.required_box is not None:
-        listed.append(demands.BoxDemand(start, wanted.tilt))
-    machine: list[demands.SearchDemand] = []
+        yield demands.BoxDemand(start, wanted.tilt)
     if wanted.held:
-        machine.append(grid_demands.LoadDemand(start, 1.0))
+        yield grid_demands.LoadDemand(start, 1.0)
     if wanted.error is not None:
-        machine.append(grid_demands.DisplacementDemand(start, "error", wanted.error))
+        yield grid_demands.DisplacementDemand(start, "error", wanted.error)
     if wanted.deflection is not None:
-        machine.append(grid_demands.DisplacementDemand(start, "deflection", wanted.deflection))
+        yield grid_demands.DisplacementDemand(start, "deflection", wanted.deflection)
     if wanted.acceleration is not None:
-        machine.append(grid_demands.AccelerationDemand(start, wanted.acceleration))
-    listed += machine
-    if machine or problem.objective in OF_THE_MACHINE:
-        listed.append(demands.MarginDemand(start, is_open=True))
-    # What an objective raises comes last.
-    if problem.objective == "largest-margin":
-        listed.append(demands.MarginDemand(start))
-    elif problem.objective == "smallest-load":
-        listed.append(grid_demands.LoadDemand(start))
-    elif problem.objective == "smallest-error":
-        listed.append(grid_demands.DisplacementDemand(start, "error"))
-    elif problem.objective == "smallest-deflection":
-        listed.append(grid_demands.DisplacementDemand(start, "deflection"))
-    return listed
+        yield grid_demands.AccelerationDemand(start, wanted.acceleration)
+    of_machine = wanted.held, wanted.error, wanted.deflection, wanted.acceleration
+    if any(of_machine) or objective in OF_THE_MACHINE:
+        yield demands.MarginDemand(start, is_open=True)
+    match objective:
+        case "largest-margin":
+            yield demands.MarginDemand(start)
+        case "smallest-load":
+            yield grid_demands.LoadDemand(start)
+        case "smallest-error":
+            yield grid_demands.DisplacementDemand(start, "error")
+        case "smallest-deflection":
+            yield grid_demands.DisplacementDemand(start, "deflection")
+        case _:
+            pass

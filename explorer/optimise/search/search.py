@@ -69,8 +69,7 @@ class Attempt(NamedTuple):
 class Search:
     """A run of the optimiser from values of the variables to start from.
 
-    It takes at most the steps left, and records every iterate in the trail. The iterate to beat is
-    the best of the runs so far that converged, if any did.
+    It takes at most the steps left. The iterate to beat is the best of the runs that converged.
     """
 
     problem: Problem
@@ -94,6 +93,13 @@ class Search:
         chosen = min(attempts, key=lambda a: (a.status != "converged", self.trail.rank(a.best)))
         if self.trail.is_cancelled:
             chosen = chosen._replace(status="cancelled", holding="", reason="")
+        reason, demanded = chosen.reason, self.problem.demands.volume or 0.0
+        if chosen.status == "infeasible" and 0.0 < self.largest_volume < demanded:
+            asked, found = format_apart((demanded, self.largest_volume), 6, format_number)
+            reason = (
+                f"no design within the bounds was found with a volume of {asked}; the largest "
+                f"found is {found}"
+            )
         return Run(
             start=self.start,
             status=chosen.status,
@@ -102,7 +108,7 @@ class Search:
             evaluations=self.evaluations,
             attempts=len(attempts),
             holding=chosen.holding,
-            reason=self._reason(chosen),
+            reason=reason,
         )
 
     def _attempts(self) -> Iterator[Attempt]:
@@ -114,16 +120,6 @@ class Search:
         places = promising_starts(self.problem, self.trail.run, self.trail.before_each)
         for values in itertools.islice(places, ATTEMPTS - 1):
             yield self._attempt(values)
-
-    def _reason(self, chosen: Attempt) -> str:
-        demanded, largest = self.problem.demands.volume or 0.0, self.largest_volume
-        if chosen.status == "infeasible" and 0.0 < largest < demanded:
-            asked, found = format_apart((demanded, largest), 6, format_number)
-            return (
-                f"no design within the bounds was found with a volume of {asked}; the largest "
-                f"found is {found}"
-            )
-        return chosen.reason
 
     def _attempt(self, values: Sequence[float], *, is_relaxed: bool = False) -> Attempt:
         """Search from some values; if it is relaxed, the clearance is only looked at in the end."""
@@ -165,15 +161,14 @@ class Search:
         self.trail.see_opening(state, worst)
 
     def _solve(self, model: SearchModel) -> Attempt:
-        at, missed, has_grown = model.at(model.start), list[Proof](), False
-        is_done = False
+        at, missed, has_grown, is_done = model.at(model.start), list[Proof](), False, False
         for _ in range(ROUNDS):
             before = self.steps
             at = self._feasible(model, self._sqp(model, at.u, "solving", self._may_end))
             is_done = self._is_done(model, at)
             if is_done:
                 holding = optimality(model, at).holding
-                missed = model.find_unproven(at)
+                missed = model.look_at_unproven(at)
                 if not missed:
                     missed = model.unproven_clearance(at)
                     last = self.trail.last_at(at.state)
@@ -188,12 +183,12 @@ class Search:
             elif self.steps_left <= 0:
                 break
             elif self._is_short(at.state) and not has_grown:
-                has_grown = True
-                larger = self._grow(model, at)
+                has_grown, larger = True, self._grow(model, at)
                 if larger is None:
                     break
+                is_relaxed = model.is_relaxed
                 model = SearchModel(
-                    self.problem, larger, self.trail.before_each, is_relaxed=model.is_relaxed
+                    self.problem, larger, self.trail.before_each, is_relaxed=is_relaxed
                 )
                 at = model.at(model.start)
             elif self.problem.objective == "match-volume" or self.steps == before:
@@ -234,12 +229,9 @@ class Search:
         """Whether all demands are met."""
         most = MATCHED if self.problem.objective == "match-volume" else math.inf
         # An infinite objective is no optimum.
-        if not reported_objective(self.problem, at.state) < most:
+        if not reported_objective(self.problem, at.state) < most or model.worst(at)[0] < 0.0:
             return False
-        return (
-            model.worst(at)[0] >= 0.0
-            and at.state.volume > unexplained_volume(at.state.workspace).error
-        )
+        return at.state.volume > unexplained_volume(at.state.workspace).error
 
     def _is_short(self, state: SearchState) -> bool:
         """Whether the volume is smaller than demanded."""
@@ -284,8 +276,7 @@ class Search:
             if is_enough(model, at):
                 raise Stop
 
-        before = model.evaluations
-        most = self.steps_left
+        before, most = model.evaluations, self.steps_left
         if self.problem.objective == "match-volume":
             most = min(most, STEPS_TO_MATCH)
         if model.is_relaxed:
@@ -301,10 +292,7 @@ class Search:
     def _verdict(
         self, model: SearchModel, at: Evaluation, missed: list[Proof], *, is_done: bool
     ) -> Attempt:
-        """Return the result of an attempt from its last place.
-
-        If it solved the problem otherwise, these demands are missed, or not proven.
-        """
+        """Return the result of an attempt from its last place, and what it misses if it is done."""
         spare, worst = model.worst(at)
         holding, best = optimality(model, at).holding, self.trail.best
         if is_done and missed:
@@ -322,7 +310,6 @@ class Search:
 
 
 def _missed_words(proof: Proof) -> str:
-    """Return what is not proven as a message."""
     place = f"({', '.join(map(format_number, proof.position.tolist()))})"
     if proof.missed > 0.0:
         return f"not converged: {proof.name} is not kept everywhere, such as at {place}"

@@ -108,8 +108,7 @@ def solve(
 ) -> tuple[Evaluation, int]:
     """Run SLSQP on a model from scaled variables, to the end or until `Stop` is raised.
 
-    Each accepted iterate is seen, the start among them. Return the last one and the number of
-    steps.
+    Each iterate is seen, the start among them. Return the last one and the number of steps.
     """
     accepted: list[Evaluation] = []
 
@@ -135,15 +134,9 @@ def solve(
 
 @dataclass
 class Trail:
-    """Every iterate of an optimisation.
+    """Every iterate of an optimisation; `watch` is called with each.
 
-    Attributes:
-        problem: The problem.
-        watch: Called with every iterate.
-        stop: Called before each evaluation; True ends the search.
-        run: Number of the present run.
-        history: The iterates so far.
-        is_cancelled: Whether `stop` has ended the search.
+    What `stop` returns before an evaluation says whether it ends the search.
     """
 
     problem: Problem
@@ -290,12 +283,8 @@ def _conditions(model: SearchModel, at: Evaluation, around: list[Evaluation]) ->
     # Some mean of the slopes less some sum of the gradients is to be nothing; the last row
     # makes it a mean.
     demands = np.array([row for _, row in active]).reshape(-1, len(at.u)).T
-    columns = np.vstack(
-        [
-            np.hstack([slopes, -demands]) / steepness,
-            np.hstack([np.ones(slopes.shape[1]), np.zeros(len(active))]),
-        ]
-    )
+    last_row = np.hstack([np.ones(slopes.shape[1]), np.zeros(len(active))])
+    columns = np.vstack([np.hstack([slopes, -demands]) / steepness, last_row])
     goal = np.zeros(len(at.u) + 1)
     goal[-1] = 1.0
     factors, residual = nnls(columns, goal)
@@ -322,9 +311,7 @@ def nearest_feasible(model: SearchModel, at: Evaluation) -> Evaluation | None:
         if spare >= 0.0:
             break
         missed = np.abs(at.values[model.equalities]).max(initial=-spare)
-        if not missed <= NEARLY:
-            return None
-        step = _shortest(model, at)
+        step = _shortest(model, at) if missed <= NEARLY else None
         if step is None:
             return None
         try:
@@ -343,9 +330,8 @@ def _shortest(model: SearchModel, at: Evaluation) -> FloatArray | None:
     low, high = np.isfinite(lows), np.isfinite(highs)
     # The step is to make rows · step at least what is missing.
     rows = np.vstack([at.gradients, -at.gradients[equal], identity[low], -identity[high]])
-    missing = np.concatenate(
-        [-at.values, at.values[equal], (lows - at.u)[low], (at.u - highs)[high]]
-    )
+    to_bounds = (lows - at.u)[low], (at.u - highs)[high]
+    missing = np.concatenate([-at.values, at.values[equal], *to_bounds])
     # The step is proportional to the misses, so these may be in units of the worst one.
     unit = missing.max()
     goal = np.zeros(len(at.u) + 1)

@@ -51,9 +51,7 @@ class SearchState:
     """
 
     def __init__(self, problem: Problem, u: FloatArray, places: FloatArray = NOWHERE) -> None:
-        self.problem = problem
-        self.places = places
-        self.u = u
+        self.problem, self.places, self.u = problem, places, u
         self.values: FloatArray = u * scales(problem)
 
     @cached_property
