@@ -67,26 +67,23 @@ def _3mf(prototype: Prototype) -> bytes:
         group = model.add_group(name)
         for member in members:
             part, body = by_name[member], by_name[member].body_index
-            corners = part.vertices * unit
-            item = model.add_mesh(part.name, corners, part.faces, kinds.index(part.kind))
-            origin = places.origin[body] * unit
-            group.AddComponent(item, model.transform(places.rotation[body], origin))
+            kind = kinds.index(part.kind)
+            item = model.add_mesh(part.name, part.vertices * unit, part.faces, kind)
+            place = model.transform(places.rotation[body], places.origin[body] * unit)
+            group.AddComponent(item, place)
         whole.AddComponent(group, model.untransformed)
     return model.encode(whole, _DECIMALS)
 
 
 def _glb(prototype: Prototype) -> bytes:
-    metres = 1e-3 * prototype.design.unit_mm
-    kinds = list(COLOURS)
-    return mesh.glb_bytes(
-        {
-            part.name: (part.vertices * metres, part.faces, kinds.index(part.kind))
-            for part in prototype.parts
-        },
-        _nodes(prototype, metres),
-        [mesh.material(kind, rgb, metallic=0.2, roughness=0.6) for kind, rgb in COLOURS.items()],
-        prototype.design,
-    )
+    metres, kinds = 1e-3 * prototype.design.unit_mm, list(COLOURS)
+    bodies = {
+        part.name: (part.vertices * metres, part.faces, kinds.index(part.kind))
+        for part in prototype.parts
+    }
+    look = {"metallic": 0.2, "roughness": 0.6}
+    materials = [mesh.material(kind, rgb, **look) for kind, rgb in COLOURS.items()]
+    return mesh.glb_bytes(bodies, _nodes(prototype, metres), materials, prototype.design)
 
 
 def _nodes(prototype: Prototype, metres: float) -> list[dict[str, Any]]:
@@ -111,14 +108,9 @@ def _nodes(prototype: Prototype, metres: float) -> list[dict[str, Any]]:
 
 
 def _stl_zip(prototype: Prototype) -> bytes:
-    return zip_bytes(
-        {
-            f"{part.name.replace(' ', '-')}.stl": mesh.mesh_bytes(
-                part.solid, "stl", prototype.design, part.name
-            )
-            for part in prototype.parts
-        }
-    )
+    design, parts = prototype.design, prototype.parts
+    stl = {each.name: mesh.mesh_bytes(each.solid, "stl", design, each.name) for each in parts}
+    return zip_bytes({f"{name.replace(' ', '-')}.stl": data for name, data in stl.items()})
 
 
 def exact_parts(sizes: Sizes) -> dict[str, cad.ExactShape]:
@@ -127,28 +119,25 @@ def exact_parts(sizes: Sizes) -> dict[str, cad.ExactShape]:
 
 
 def _step(prototype: Prototype) -> bytes:
-    design = prototype.design
-    home = design.home_pose
+    design, home = prototype.design, prototype.design.home_pose
     places = prototype.chains.places_at(home.position, home.rotation)
     parts = exact_parts(prototype.sizes)
     bodies = {part.name: part.body_index for part in prototype.parts}
     document = cad.Document()
 
-    def add_group(name: str) -> Any:
-        label = document.shapes.NewShape()
+    def named(label: Any, name: str) -> Any:
         document.set_name(label, name)
         return label
 
     def add(group: Any, label: Any, transformation: Any, name: str) -> None:
         location = cad.occ("TopLoc_Location")(transformation)
-        document.set_name(document.shapes.AddComponent(group, label, location), name)
+        named(document.shapes.AddComponent(group, label, location), name)
 
-    whole = add_group(f"mechanism of {design.name}")
+    whole = named(document.shapes.NewShape(), f"mechanism of {design.name}")
     for name, members in part_groups():
-        group = add_group(name)
+        group = named(document.shapes.NewShape(), name)
         for member in members:
-            label = document.shapes.AddShape(parts[member].shape, False)
-            document.set_name(label, member)
+            label = named(document.shapes.AddShape(parts[member].shape, False), member)
             document.set_colour(label, COLOURS[member.partition(" ")[0]])
             body = bodies[member]
             place = cad.transform(places.rotation[body], places.origin[body] * design.unit_mm)

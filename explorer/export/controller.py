@@ -102,15 +102,12 @@ def pair_rows(design: Design) -> tuple[FloatArray, list[str]]:
     A pair that shares a joint may touch: its distance is negative and its words are empty.
     """
     distances = design.unit_mm * Rules.of(design).row[quantities.RADII :]
-    words = [
-        ""
-        if least < 0.0
-        else f"more than {format_number(least)} apart"
-        if least
-        else "do not touch"
-        for least in distances.tolist()
-    ]
-    return distances, words
+
+    def words(least: float) -> str:
+        apart = f"more than {format_number(least)} apart" if least else "do not touch"
+        return "" if least < 0.0 else apart
+
+    return distances, [*map(words, distances.tolist())]
 
 
 def _number(value: float) -> str:

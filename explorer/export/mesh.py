@@ -130,15 +130,13 @@ class ThreeMfModel:
         self._model: Any = wrapper.CreateModel()
         self._model.SetUnit(self._library.ModelUnit.MilliMeter)
         about = self._model.GetMetaDataGroup()
-        for key, value in (
-            ("Title", name),
-            ("Application", APPLICATION),
-            ("Description", f"{name}; one design unit is {design.unit_mm:g} mm"),
+        for space, key, value in (
+            ("", "Title", name),
+            ("", "Application", APPLICATION),
+            ("", "Description", f"{name}; one design unit is {design.unit_mm:g} mm"),
+            (NAMESPACE, "design", msgspec.json.encode(design).decode()),
         ):
-            about.AddMetaData("", key, value, "xs:string", True)
-        about.AddMetaData(
-            NAMESPACE, "design", msgspec.json.encode(design).decode(), "xs:string", True
-        )
+            about.AddMetaData(space, key, value, "xs:string", True)
         group = self._model.AddBaseMaterialGroup()
         self._materials: int = group.GetResourceID()
         self._ids = [

@@ -209,9 +209,8 @@ class Document:
     def set_colour(self, label: Any, rgb: Rgb) -> None:
         """Set the surface colour of a label."""
         red, green, blue = (linear(channel) for channel in rgb)
-        colour = occ("Quantity_Color")(
-            red, green, blue, occ("Quantity_TypeOfColor").Quantity_TOC_RGB
-        )
+        space = occ("Quantity_TypeOfColor").Quantity_TOC_RGB
+        colour = occ("Quantity_Color")(red, green, blue, space)
         self.colours.SetColor(label, colour, occ("XCAFDoc_ColorType").XCAFDoc_ColorSurf)
 
     def step(self) -> bytes:

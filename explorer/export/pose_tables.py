@@ -78,10 +78,7 @@ _ANSWERED = ("line", "mode", "within_limits", "violations")
 
 
 class PoseColumn(NamedTuple):
-    """A column: its place among the cells of a line, its heading, and the factor of its unit.
-
-    The factor leads to design units, degrees or seconds.
-    """
+    """A column: its place in a line, its heading, and its factor to units, degrees or seconds."""
 
     place: int
     heading: str
@@ -90,14 +87,9 @@ class PoseColumn(NamedTuple):
 
 @dataclass(frozen=True)
 class PoseTable:
-    """A table of text whose known columns are read as numbers.
+    """A table of text, whose known columns, by names without units, are read as numbers.
 
-    Attributes:
-        file: Name of the file, for messages.
-        headings: Headings of all columns, known or not.
-        columns: Known columns by their names, without units.
-        rows: Number of the line in the file, and cells, of each line that is not blank.
-        decimal: The decimal sign of all numbers, a point or a comma.
+    A row that is not blank has its number in the file, and cells; the decimal sign is of all.
     """
 
     file: str
@@ -263,9 +255,8 @@ def read_poses(
         values = table.numbers(*names)
         zeros: list[int] = np.flatnonzero(~values.any(axis=1)).tolist()
         if names == QUATERNION and zeros:
-            table.refuse(
-                zeros[0], "qw", "a quaternion must not be all zeros; no turn is 1, 0, 0, 0"
-            )
+            needs = "a quaternion must not be all zeros; no turn is 1, 0, 0, 0"
+            table.refuse(zeros[0], "qw", needs)
         rotation = _ROTATIONS[names](values)
     position = table.numbers(*(POSITION if at == "b4" else TOOL))
     return Configuration(design, position - offset_of(design, rotation, at), rotation)
@@ -286,15 +277,10 @@ def read_joints(table: PoseTable) -> FloatArray:
 
 
 class TableAnswer(NamedTuple):
-    """A table of poses with their joints, and what became of the lines of the given one.
+    """A table of poses with their joints as CSV, and what became of the lines of the given one.
 
-    Attributes:
-        csv: The answer as CSV, a line per pose.
-        lines: Number of lines that were given.
-        closing: Number of them that have a pose.
-        within: Number of them with a pose within the limits.
-        first: Line number and fault of the first line without a pose within the limits.
-        skipped: Headings of the columns of the given table that are not read.
+    These are counts of lines: given, with a pose, and with a pose within the limits; the number and
+    the fault of the first one without; and the headings of columns that are not read.
     """
 
     csv: str
@@ -332,10 +318,7 @@ def _answer(
     closes: BoolArray,
     at: Point,
 ) -> TableAnswer:
-    """Return the answer for joints (n, 6) and poses, given the line and the mode of each, (m,).
-
-    Joints that do not close have one pose, which is left out.
-    """
+    """Return the answer for joints (n, 6) and poses, given the line and the mode of each, (m,)."""
     (given, mode), (words, kind, broken) = numbers, _verdicts(poses)
     heads, columns = _columns(poses, len(given), at)
     time = [name for name in ("time",) if name in table.columns]
@@ -344,9 +327,8 @@ def _answer(
         f"{line},{','.join(map(repr, row))}" for line, row in zip(table.lines, known, strict=True)
     ]
     rows: list[str] = []
-    for index, number, row, which in zip(
-        given.tolist(), mode.tolist(), columns.tolist(), kind.tolist(), strict=True
-    ):
+    lists = (each.tolist() for each in (given, mode, columns, kind))
+    for index, number, row, which in zip(*lists, strict=True):
         if closes[index]:
             values = ",".join([str(number), *map(repr, row), "false" if words[which] else "true"])
             rows.append(f"{starts[index]},{values},{words[which]}")
@@ -364,16 +346,14 @@ def _answer(
     start = ["line", *(f"{name}_s" for name in time), *length_heads(JOINTS, poses.design.unit_mm)]
     head = [*start, "mode", *heads, "within_limits", "violations"]
     text = "\n".join([",".join(head), *rows, ""])
-    return TableAnswer(
-        text, len(closes), int(closes.sum()), int(within.sum()), first, table.skipped
-    )
+    counts = len(closes), int(closes.sum()), int(within.sum())
+    return TableAnswer(text, *counts, first, table.skipped)
 
 
 def _verdicts(poses: Configuration) -> tuple[list[str], IntArray, IntArray]:
-    """Return the sets of limits that poses violate, in words, and the set and its size of each.
+    """Return sets of violated limits in words, and the index and size of that of each pose, (m,).
 
-    The words are the names of the limits in the order of the design file, and of pairs of legs
-    that collide. The indices of the sets and their sizes have the shape (m,).
+    The limits are in the order of the design file, then come pairs of legs that collide.
     """
     demands, _, sides = sides_of_limits(poses)
     pairs = zip(COLLISIONS, COLLISIONS, strict=True)

@@ -34,15 +34,10 @@ RIGID = 10.0
 
 
 class Servos(NamedTuple):
-    """The six servos, each an array of shape (6,) in the order of `JOINTS`.
+    """The six servos in the order of `JOINTS`: N/m, N s/m, kg and N, each of shape (6,).
 
-    Attributes:
-        stiffness: Stiffness, in N/m.
-        damping: Damping, in N s/m.
-        rotors: Inertia of the rotors, as masses that move with the joints, in kg.
-        weights: Forces that hold the weights of all bodies at home, in N.
-        forces: Forces at the commanded joint values, in N: the same, or zeros for servos that give
-            way as the design does.
+    The weights are forces that hold all bodies at home; the forces at the commanded joint values
+    are the same, or zeros for servos that give way as the design does.
     """
 
     stiffness: FloatArray
@@ -66,13 +61,7 @@ def droop_text(displacement: ArrayLike, turn: ArrayLike) -> str:
 
 
 class Strokes(NamedTuple):
-    """The ranges of the actuated joints; what the home pose exceeds ends there.
-
-    Attributes:
-        ranges: Ranges of those joints that have one, in metres, by their names.
-        gap: Least distance of the carriages, in metres.
-        exceeded: Whether the home pose exceeds one of the limits.
-    """
+    """Ranges of actuated joints and the least gap of carriages, in metres; home exceeds no end."""
 
     ranges: Mapping[str, tuple[float, float]]
     gap: float
@@ -125,9 +114,8 @@ def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> S
     home, metres = Configuration.at(design, design.home_pose), 1e-3 * design.unit_mm
     twists = twists_of_actuators(home).T
     if not np.isfinite(twists).all():
-        raise NoAnswerError(
-            "the home pose is singular, so that no servos hold it; choose another home"
-        )
+        message = "the home pose is singular, so that no servos hold it; choose another home"
+        raise NoAnswerError(message)
     # At rest, and with an acceleration of each actuator.
     bodies, accelerations = moving_bodies(design, masses), np.vstack([np.zeros(6), twists])
     held = forces_in_motion(home, bodies, acceleration=accelerations)

@@ -90,10 +90,6 @@ def simulation_mjcf(
 class SimulationModel:
     """The model of a design in its home pose, or of an imperfect machine of it.
 
-    Attributes:
-        servos: The six servos.
-        strokes: The ranges of the actuated joints.
-
     Args:
         given: The manipulator, or an imperfect machine of it.
         density: Density of the bodies, in kg/m³.

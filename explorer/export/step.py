@@ -22,11 +22,7 @@ from explorer.export.opencascade import Document, ExactShape, occ, primitive
 from explorer.files.extras import check_extra
 from explorer.measures.box import corners_of
 from explorer.numerics.arrays import FloatArray, triple
-from explorer.workspace.limits.constraints import (
-    BallOrCylinder,
-    Cone,
-    Constraint,
-)
+from explorer.workspace.limits.constraints import BallOrCylinder, Cone, Constraint
 from explorer.workspace.limits.region import Region
 from explorer.workspace.slices.volume import volume_of
 from explorer.workspace.workspace import Workspace
@@ -42,11 +38,7 @@ _FAR = 4.0
 
 @dataclass(frozen=True)
 class ExactSolid:
-    """The workspace as a boundary representation of OpenCASCADE, in millimetres.
-
-    The shape is a `TopoDS_Shape` of solids; the names of the limits of its faces are in the order
-    of OpenCASCADE's explorer.
-    """
+    """The workspace as a `TopoDS_Shape` in millimetres, with the limit of each of its faces."""
 
     shape: Any
     limit_of_face: tuple[str, ...]

@@ -195,10 +195,9 @@ def elements(blocks: Iterable[kinds.Block]) -> Iterator[Element]:
                 rows = [(fact.name, pieces_of(fact.words), _remark(fact)) for fact in facts]
                 yield table((), rows, "<><", _caption(title, hint))
             case kinds.Table():
-                columns = [_column(column) for column in block.columns]
-                heads, aligns, cells = zip(*columns, strict=True)
-                rows = zip(*cells, strict=True)
-                yield table(heads, rows, "".join(aligns), _caption(block.title, block.hint))
+                heads, aligns, cells = zip(*map(_column, block.columns), strict=True)
+                caption = _caption(block.title, block.hint)
+                yield table(heads, zip(*cells, strict=True), "".join(aligns), caption)
             case kinds.Split(title, names, shares, hint):
                 rows = zip(names, map(_share, shares), strict=True)
                 yield table((), rows, "<>", _caption(title, hint))

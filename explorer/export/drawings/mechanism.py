@@ -140,10 +140,7 @@ def extents(name: ViewName, points: FloatArray) -> tuple[FloatArray, FloatArray]
 def fit_view(
     name: ViewName, points: FloatArray, frame: Frame, scale: float | None = None
 ) -> Projection:
-    """Return the view in which points (n, 3) fill a frame on paper, in its middle.
-
-    The scale is in points of paper per design unit, the largest that fits if None.
-    """
+    """Return the view in which points (n, 3) fill a frame, at a scale or the largest that fits."""
     return Projection(_axes(name), 1.0, np.zeros(2)).fit(points, frame, scale)
 
 
@@ -374,22 +371,16 @@ def _guide(snapshot: Snapshot) -> FloatArray:
 def _leg(view: Projection, leg: FloatArray) -> list[Element]:
     ends = view.to(leg)
     cylinder = view.to(np.array([leg[0], leg[0] + CYLINDER * (leg[1] - leg[0])]))
-    return [
-        line(ends, "casing"),
-        line(cylinder, "casing thick"),
-        line(ends, "rod"),
-        line(cylinder, "cylinder"),
-    ]
+    looks = {"casing": ends, "casing thick": cylinder, "rod": ends, "cylinder": cylinder}
+    return [line(points, look) for look, points in looks.items()]
 
 
 def _area(view: Projection, corners: Sequence[FloatArray], class_: str, fill: str) -> Element:
-    return element(
-        "path", d=path_of(view.to(np.array(corners)), decimals=PRECISE), class_=class_, fill=fill
-    )
+    data = path_of(view.to(np.array(corners)), decimals=PRECISE)
+    return element("path", d=data, class_=class_, fill=fill)
 
 
 def _key(x: float, y: float) -> Iterator[Element]:
-    """Yield the key to the signs of the drawings."""
     yield drawing_text("Key", x, y, "title")
     leg = (
         line(((x, 0.0), (x + length, 0.0)), name)
@@ -399,12 +390,10 @@ def _key(x: float, y: float) -> Iterator[Element]:
         element("circle", cx=x + 9.0, cy=0.0, r=4.2, class_=name, fill=fill)
         for name, fill in (("joint", DARK), ("ball", LIGHT))
     )
+    carriage = element("rect", x=x + 4.0, y=-5.0, width=10.0, height=10.0, class_="carriage")
     entries = (
         (joint, "universal joint, on the base"),
-        (
-            element("rect", x=x + 4.0, y=-5.0, width=10.0, height=10.0, class_="carriage"),
-            "carriage on the guide: d1, d3",
-        ),
+        (carriage, "carriage on the guide: d1, d3"),
         (ball, "ball joint, on the platform"),
         (element("g", *leg), "leg: cylinder and rod"),
     )

@@ -43,11 +43,7 @@ NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY = OUTLINE, 0.38
 
 @dataclass(frozen=True)
 class Slices:
-    """Slices of a workspace.
-
-    The lows and highs (3,) are corners of a box that holds the workspace; the measure that is drawn
-    is in bands.
-    """
+    """Slices of a workspace within a box (lows and highs, (3,)), with the bands to draw."""
 
     workspace: Workspace
     lows: FloatArray
@@ -60,10 +56,7 @@ class Slices:
         extent: tuple[FloatArray, FloatArray],
         bands: PositionBands | None = None,
     ) -> Slices:
-        """Return the slices of a workspace that is not empty, of known extent.
-
-        Without bands, those of the smallest margin on a new page are drawn.
-        """
+        """Return the slices of a workspace of known extent, with bands of the margin if None."""
         if bands is None:
             warn_below = WARN_SHARE * workspace.design.reach
             bands = position_bands(workspace, "margin", warn_below=warn_below)
@@ -82,11 +75,7 @@ class Slices:
         return round_length(0.15 * float((self.highs - self.lows).max()))
 
     def map(
-        self,
-        axis: str,
-        level: float,
-        name: str,
-        not_accessible: Sequence[FloatArray] = (),
+        self, axis: str, level: float, name: str, not_accessible: Sequence[FloatArray] = ()
     ) -> Element:
         """Return the map of a slice, in its own coordinates: scaled, from the lows, y upwards.
 
@@ -151,8 +140,7 @@ class Slices:
     def beyond(self, axis: str, level: float) -> Callable[[float], Iterable[FloatArray]]:
         """Return the function from values of the bands to the polygons of a slice beyond them.
 
-        The polygons, each of shape (n, 2) in design units, are filled by the even-odd rule; they
-        may go beyond the limits.
+        The polygons (n, 2), in design units, are filled by the even-odd rule, also beyond limits.
         """
         if self.bands.measure == "margin":
             unit = self.bands.levels[-1] / self.bands.edges[-1]
@@ -172,10 +160,7 @@ class Slices:
         return lambda value: [*loops(value, 1.0), *loops(value, -1.0)]
 
     def _signed(self, points: FloatArray) -> FloatArray:
-        """Return the values of the bands at points (n, 3), smooth where they are zero.
-
-        They have the sign of the determinant.
-        """
+        """Return values of the bands at points (n, 3) with the sign of det J, smooth at zero."""
         sign = np.where(margins(points, self.workspace.rotation).prod(axis=-1) < 0.0, -1.0, 1.0)
         return sign * self.bands.values(points)
 
@@ -184,8 +169,7 @@ class Slices:
         for signs in itertools.product((-1.0, 1.0), repeat=3):
             polygon = self._corners(axis)
             for sign, gradient in zip(signs, gradients, strict=True):
-                beyond = float(gradient[AXES.index(axis)]) * level
-                least = margin - sign * beyond
+                least = margin - sign * (float(gradient[AXES.index(axis)]) * level)
                 polygon = _clip(polygon, sign * (polygon @ gradient[in_plane(axis)]) - least)
                 if not len(polygon):
                     break
@@ -249,10 +233,9 @@ def _clip(polygon: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def slices_through(slices: Slices, position: Sequence[float], name: str = "slice") -> Element:
-    """Return the three maps of the slices through a position, side by side at one scale.
+    """Return the maps of the slices through a position, (3,) in design units, side by side.
 
-    The position is in design units, (3,); the names of the maps, unique in the document, begin with
-    the given one.
+    The names of the maps, unique in the document, begin with the given one.
     """
     spans = (slices.highs - slices.lows).tolist()
     wide, high = 2.0 * spans[0] + spans[1], max(spans[1], spans[2])

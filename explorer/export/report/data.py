@@ -45,9 +45,7 @@ def compute(function: Callable[[], T]) -> T | ExplorerError:
 class ReportData(Case):
     """The data of a report: a design in a pose and its workspace at that orientation.
 
-    Attributes:
-        record: Record of the search that found the design; None without one.
-        path: Path whose speeds and forces are told; None for none.
+    The record is of the search that found the design, the path one with speeds and forces.
     """
 
     record: Record | None = None

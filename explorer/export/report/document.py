@@ -86,7 +86,6 @@ def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
 
 
 def _hash(data: ReportData) -> str:
-    """Return the SHA-256 of the design file, in hexadecimal."""
     return sha256(encode_design(data.design)).hexdigest()
 
 
@@ -108,11 +107,8 @@ def _headline(data: ReportData) -> Iterator[tuple[Piece, ...]]:
             yield title, value, _unit(measure.unit_in(UNITS).name)
     yield "Reach", markup.number(reach, 4), _unit("mm")
     yield "Smallest margin |δ| here", markup.number(snapshot.proximity * reach, 4), _unit("mm")
-    yield (
-        "Inverse condition here",
-        markup.number(float(snapshot.inverse_condition), 4),
-        _unit("of 1"),
-    )
+    condition = markup.number(float(snapshot.inverse_condition), 4)
+    yield "Inverse condition here", condition, _unit("of 1")
     clearance = float(snapshot.clearances.clearance.min()) * data.design.unit_mm
     yield "Least clearance here", markup.number(clearance, 4), _unit("mm")
 
@@ -137,10 +133,7 @@ def search_section(data: ReportData) -> Iterator[Element]:
         words = "The search from the chosen start, by iterations; dashed lines are the demands."
         yield markup.illustration(drawn, words)
     best = next((step for step in record.history if step.number == run.best), None)
-    rows: list[Row] = [
-        ("objective", problem.objective.replace("-", " ")),
-        ("status", run.status),
-    ]
+    rows: list[Row] = [("objective", problem.objective.replace("-", " ")), ("status", run.status)]
     if problem.demands.volume is not None:
         rows.append(("demanded volume, units³", problem.demands.volume))
     if best is not None:
@@ -168,12 +161,8 @@ def search_section(data: ReportData) -> Iterator[Element]:
             for word, old, new in zip(("from", "to"), *ends, strict=True):
                 changes.append((f"{name} {word}", old, new, new - old))
     heads = ("units", "start", "optimum", "change")
-    yield element(
-        "div",
-        markup.table((), rows, "<>", "The search"),
-        markup.table(heads, changes, "<>>>", "The design"),
-        class_="pair",
-    )
+    search = markup.table((), rows, "<>", "The search")
+    yield element("div", search, markup.table(heads, changes, "<>>>", "The design"), class_="pair")
     if drawn is None:
         yield paragraph("No iterate was recorded.")
 
@@ -206,7 +195,6 @@ def _title(record: Record, curve: Curve) -> str:
 
 
 def _chart(curve: Curve, left: float, width: float) -> Iterator[Element]:
-    """Yield one chart with its axes."""
     low, high = _range(curve)
     last = float(max(1, len(curve.values) - 1))
     bottom, upwards = HEIGHT - BOTTOM, (HEIGHT - TOP - BOTTOM) / (high - low)
@@ -258,14 +246,11 @@ def _reproduction(data: ReportData) -> Iterator[Element]:
     if record is None:
         yield paragraph("Nothing here is random; there is no seed.")
     else:
+        seed, starts = record.settings.seed, record.settings.starts
         yield paragraph(
-            *("The search is the same each time: seed ", whole(record.settings.seed), ", "),
-            *(
-                whole(record.settings.starts),
-                " start" if record.settings.starts == 1 else " starts",
-            ),
-            *(" of at most ", whole(record.settings.iterations), " iterations. "),
-            "Nothing else here is random.",
+            *("The search is the same each time: seed ", whole(seed), ", ", whole(starts)),
+            *(" start" if starts == 1 else " starts", " of at most "),
+            *(whole(record.settings.iterations), " iterations. Nothing else here is random."),
         )
         columns["the search"] = record.versions
     names = dict.fromkeys(name for each in columns.values() for name in each)

@@ -61,10 +61,7 @@ def mechanism_section(data: ReportData) -> Iterator[Element]:
         "reach, or the nearest singular pose is nearer than a third of it; blue beyond.",
     )
     values = zip(_MEANINGS.items(), (*data.design.variables, data.design.reach), strict=True)
-    rows = [
-        _lengths(data, (element("b", name), f" {meaning}"), value)
-        for (name, meaning), value in values
-    ]
+    rows = [_lengths(data, (element("b", k), f" {word}"), value) for (k, word), value in values]
     heads = ("design variable", "units", "mm")
     variables = markup.table(heads, rows, "<>>", "Design variables X")
     yield element("div", variables, _pose(data), class_="pair")
@@ -98,10 +95,8 @@ def angle_rows(rotation: FloatArray, of: str = "") -> Iterator[Row]:
 def _pose(data: ReportData) -> Element:
     pose = data.snapshot.pose
     rows = [*point_rows(data, "b4", pose.position), *angle_rows(data.rotation)]
-    rows += [
-        (f"quaternion {name}", value, "")
-        for name, value in zip("wxyz", pose.quaternion, strict=True)
-    ]
+    turn = zip("wxyz", pose.quaternion, strict=True)
+    rows += [(f"quaternion {name}", value, "") for name, value in turn]
     return markup.table(("", "units", "mm"), rows, "<>>", "Home pose" if data.is_home else "Pose")
 
 

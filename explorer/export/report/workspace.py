@@ -66,13 +66,8 @@ def workspace_section(data: ReportData) -> Iterator[Element]:
     if isinstance(data.accessible, ExplorerError):
         words = f"The accessible workspace cannot be computed: {data.accessible}."
         yield paragraph(words, class_="note")
-    rates = data.volume.gradient
-    gradient = markup.table(
-        ("with", "units³ per unit; yaw per radian"),
-        [*rates.items()],
-        "<>",
-        "Gradient of the volume",
-    )
+    rates, heads = data.volume.gradient, ("with", "units³ per unit; yaw per radian")
+    gradient = markup.table(heads, rates.items(), "<>", "Gradient of the volume")
     extent = element("div", _extent(data), bounding)
     yield element("div", extent, gradient if rates else None, class_="pair")
 
@@ -110,10 +105,8 @@ def _volumes(data: ReportData) -> Element:
     rows: list[Row] = []
 
     def add(name: str, volume: float | None, remark: Cell) -> None:
-        cells = (
-            ("–", "–") if volume is None else (volume, volume * (0.1 * data.design.unit_mm) ** 3)
-        )
-        rows.append((name, *cells, remark))
+        cubic = None if volume is None else volume * (0.1 * data.design.unit_mm) ** 3
+        rows.append((name, *("–" if each is None else each for each in (volume, cubic)), remark))
 
     for name, value in data.measurements.values.items():
         measure = CATALOGUE[name]
@@ -152,8 +145,7 @@ def _bounds(solid: Solid) -> Element:
         for share, name in sorted(zip(shares.tolist(), solid.limits, strict=True), reverse=True)
         if share > 0.0
     ]
-    heads = ("bounded by", "share of the surface")
-    return markup.table(heads, rows, "<>", "Limits that bound it")
+    return markup.table(("bounded by", "share of the surface"), rows, "<>", "Limits that bound it")
 
 
 def loads_section(data: ReportData) -> Iterator[Element]:
@@ -244,8 +236,7 @@ def _over_the_workspace(
 ) -> Iterator[Element]:
     yield element("h3", "Where the payload is held")
     if isinstance(carried, ExplorerError):
-        words = f"The volume that holds it cannot be computed: {carried}."
-        yield paragraph(words, class_="note")
+        yield paragraph(f"The volume that holds it cannot be computed: {carried}.", class_="note")
     else:
         cubic, entire = (0.1 * data.design.unit_mm) ** 3, data.volume.volume
         rows: list[Row] = [
@@ -269,7 +260,6 @@ def _over_the_workspace(
 
 
 def _best(position: FloatArray, factor: float) -> Element:
-    """Return the words for the position of an empty solid that holds most of the payload."""
     at = ("(", *markup.vector(position.tolist()), ")")
     if factor > 1.0:
         words = "The positions that hold the payload are too few for a solid. The best is "
