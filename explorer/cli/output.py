@@ -39,7 +39,7 @@ def _plain(value: Any) -> object:
     return str(value) if isinstance(value, PurePath) else value.tolist()
 
 
-def attributes(of: object, names: str) -> dict[str, object]:
+def attributes(of: object, names: str) -> dict[str, Any]:
     """Return attributes of a value by their names, which spaces separate."""
     return {name: getattr(of, name) for name in names.split()}
 

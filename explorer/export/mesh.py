@@ -82,14 +82,10 @@ def glb_bytes(
     materials: Sequence[Mapping[str, Any]],
     design: Design,
 ) -> bytes:
-    """Return a GLB file.
+    """Return a GLB file, which keeps the design as JSON.
 
-    Args:
-        bodies: Meshes by name: corners in metres, shape (n, 3), indices of the corners of each
-            triangle, shape (m, 3), and the index of a material; nodes refer to them in this order.
-        nodes: Nodes in glTF; the first is the root and rotates by `Y_UP`.
-        materials: Materials that the bodies refer to, as `material` returns them.
-        design: The design, kept as JSON in the file.
+    A body by name is corners (n, 3) in metres, triangles (m, 3), and the index of a material. Nodes
+    refer to them in their order; the first one is the root and rotates by `Y_UP`.
     """
     import trimesh
 
@@ -214,9 +210,7 @@ ROUNDING = 1e-5
 
 
 def mesh_bytes(solid: Solid, file_format: str, design: Design, name: str) -> bytes:
-    """Return a file in one of `FORMATS` of a solid in design units, closed and not empty.
-
-    The solid has a name in the file; its design gives the unit.
+    """Return a file in one of `FORMATS` of a named solid in the units of a design.
 
     Raises:
         InputError: The format is unknown, or too coarse for coordinates of this size.

@@ -157,12 +157,9 @@ def read_table(path: Path, unit_mm: float) -> PoseTable:
 
 
 def parse_table(file: str, data: bytes, unit_mm: float) -> PoseTable:
-    """Return the table in the contents of a CSV file.
+    """Return the table in the contents of a CSV file, whose name messages tell.
 
-    Args:
-        file: Name of the file, for messages.
-        data: Contents: UTF-8 or UTF-16, with or without a byte order mark, or Windows-1252.
-        unit_mm: Millimetres in the design unit of the table's numbers.
+    They are UTF-8 or UTF-16, with or without a byte order mark, or Windows-1252.
 
     Raises:
         InputError: The file is no table, or a heading has a wrong unit or appears twice.

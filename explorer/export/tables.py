@@ -32,8 +32,7 @@ def trajectory_csv(trajectory: Trajectory, unit_mm: float | None = None) -> str:
 def drives_csv(drives: PathDrives, trajectory: Trajectory) -> str:
     """Return what a path asks of the actuators as CSV: a header, then a line per sample.
 
-    The trajectory of the same path and time law gives the samples. Times are in s, lengths in mm,
-    speeds in mm/s, forces in N and powers in W, as the header says.
+    The trajectory is that of the same path and time law; lengths are in mm.
     """
     head, columns = _columns(trajectory, 1.0)
     rows = drives.at(trajectory.time)
@@ -69,10 +68,9 @@ tool, and the share in its worst displacement."""
 
 
 def tolerance_csv(costs: SourceCosts) -> str:
-    """Return the tolerances and their costs as CSV: a header, then a line per source of errors.
+    """Return tolerances and their costs as CSV: a header, then lines of sources, by part.
 
-    The lines are sorted by part; a tolerance that may be any is empty. Numbers round-trip to the
-    last bit.
+    A tolerance that may be any is empty. Numbers round-trip to the last bit.
     """
     effects = costs.displacement, costs.turn, costs.displacement_within, costs.turn_within
     numbers = np.stack([*effects, costs.shares], axis=-1).tolist()

@@ -43,9 +43,7 @@ class IterateRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """An iterate without its design, which follows from the values.
 
     Attributes:
-        number: Number from 0, over all runs.
-        run: Number of the run, from 0.
-        phase: Phase of the search.
+        number, run: Number from 0 over all runs, and number of the run from 0.
         values: Values of the variables of the problem.
         objective: F = |1 − V/V′|, or the value of the measure that the objective improves; None
             if it is infinite.
@@ -203,18 +201,9 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An optimisation as a file holds it.
+    """An optimisation as a file holds it, with its best design and the index of the best run.
 
-    Attributes:
-        schema: Version of the file format.
-        problem: The problem.
-        settings: Settings of the search.
-        design: Best design.
-        chosen: Index of the best run.
-        runs: Run from each start; the best iterate is an index into the history.
-        history: Every iterate.
-        seconds: Duration in seconds.
-        versions: Versions of Python and the libraries by name.
+    A run of each start has its best iterate as an index into the history, which has all iterates.
     """
 
     schema: Literal[1] = 1

@@ -61,11 +61,7 @@ LEAST_REACH = 1e-3
 
 
 class DesignStartError(InputError):
-    """A design from which a problem cannot start.
-
-    Attributes:
-        limit: Limit that prevents it, or what the design lacks, such as `SWING_LIMIT` or `NO_LOAD`.
-    """
+    """A design from which a problem cannot start, for a limit or a lack such as `NO_LOAD`."""
 
     def __init__(self, message: str, limit: str = "") -> None:
         super().__init__(message)
@@ -136,12 +132,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A variable and its bounds.
-
-    Attributes:
-        name: One of `VARIABLES` or `OPTIONAL`.
-        low, high: Bounds in design units; of the yaw in degrees.
-    """
+    """One of `VARIABLES` or `OPTIONAL`, and its bounds in design units; of the yaw in degrees."""
 
     name: str
     low: float
@@ -157,11 +148,7 @@ class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A problem of optimal design.
 
-    Attributes:
-        start: Design to start from, with its home pose, which stays the same in all designs.
-        objective: One of `OBJECTIVES`.
-        variables: Variables; everything else stays as in the start.
-        demands: Demands.
+    It starts from a design; what is no variable, the home pose too, stays the same in all designs.
 
     Raises:
         StartError: A start that its limits, or what it lacks, keep from a search.

@@ -156,27 +156,19 @@ class OptimiseCommand(options.JsonOptions, options.DesignOptions):
             return record.problem, record.settings
         if self.objective == "match-volume" and self.target_volume is None:
             raise InputError("say which volume to match with --target-volume")
+        same = (
+            "clearance clearance_margin least stroke_ratio held error deflection acceleration tilt"
+        )
         problem = make_problem(
             self._start(),
             self.objective,
             volume=self.target_volume,
             reach=self.target_reach,
-            clearance=self.clearance,
-            clearance_margin=self.clearance_margin,
-            least=self.least,
-            stroke_ratio=self.stroke_ratio,
             required_box=None if self.required_box is None else _as_box(self.required_box),
-            held=self.held,
-            error=self.error,
-            deflection=self.deflection,
-            acceleration=self.acceleration,
-            tilt=self.tilt,
-            free=self.free,
             bounds=[_as_variable(word) for word in self.bounds],
+            **output.attributes(self, f"{same} free"),
         )
-        return problem, outcomes.Settings(
-            starts=self.starts, seed=self.seed, iterations=self.iterations
-        )
+        return problem, outcomes.Settings(**output.attributes(self, "starts seed iterations"))
 
     def _start(self) -> Design:
         """Return the design with the given limits; its home is fixed before its box changes."""
@@ -228,14 +220,8 @@ def _search(
         meter.show(text + (f", missed: {iterate.worst}" if iterate.spare < 0.0 else ""), share)
 
     with Meter() as meter:
-        return solver.optimise_design(
-            problem,
-            starts=starts,
-            seed=settings.seed,
-            iterations=settings.iterations,
-            watch=show,
-            stop=stop,
-        )
+        given = msgspec.structs.asdict(settings)
+        return solver.optimise_design(problem, watch=show, stop=stop, **given)
 
 
 def _as_box(six: Six) -> Box:

@@ -14,6 +14,7 @@ import tyro
 
 from explorer.cli import values
 from explorer.cli.options import JsonOptions, PoseOptions, load
+from explorer.cli.output import attributes
 from explorer.errors import InputError
 from explorer.files.writing import check_writable, write_whole
 from explorer.optimise.outcome import load_record
@@ -137,13 +138,5 @@ class ScreenshotCommand(JsonOptions, PoseOptions):
 
         # Standard output belongs to the answer; viser reports there when a server stops.
         with contextlib.redirect_stdout(io.StringIO()):
-            take(
-                design,
-                pose,
-                view=self.view,
-                out=self.out,
-                size=self.size,
-                panels=self.panels,
-                handle=self.handle,
-            )
+            take(design, pose, **attributes(self, "view out size panels handle"))
         self.write(lambda: {"file": self.out, "size": self.size}, [str(self.out)])
