@@ -42,12 +42,7 @@ def inversions(permutation: tuple[int, ...]) -> int:
 
 
 def ranks(permutation: tuple[int, ...]) -> IntArray:
-    """Return r_ij, shape (3, 3): how many of a permutation's first i entries are at most j."""
-    return _all_ranks(permutation)[1:4, 1:4]
-
-
-def _all_ranks(permutation: tuple[int, ...]) -> IntArray:
-    """Return r_ij, shape (5, 5), for i and j from 0 to 4."""
+    """Return r_ij, (5, 5), i and j from 0: how many of the first i entries are at most j."""
     return np.array([[sum(v <= j for v in permutation[:i]) for j in range(5)] for i in range(5)])
 
 
@@ -56,7 +51,7 @@ STRATA: tuple[tuple[int, ...], ...] = tuple(
 )
 """The 24 permutations by dimension, from both flags coinciding to the generic one."""
 
-_RANKS_OF_STRATA = np.stack([ranks(w) for w in STRATA])
+_RANKS_OF_STRATA = np.stack([ranks(w)[1:4, 1:4] for w in STRATA])
 
 
 def stratum(position: ArrayLike, rotation: ArrayLike, length: float | None = None) -> IntArray:
@@ -162,7 +157,7 @@ def is_below(lower: Stratum, upper: Stratum) -> bool:
 
 def conditions(stratum: Stratum) -> tuple[Condition, ...]:
     """Return the essential conditions (i, j, r), r_ij ≥ r, of a stratum; none if it is generic."""
-    r: list[list[int]] = _all_ranks(stratum).tolist()
+    r: list[list[int]] = ranks(stratum).tolist()
 
     def is_redundant(i: int, j: int) -> bool:
         value = r[i][j]
