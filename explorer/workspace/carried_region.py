@@ -67,7 +67,7 @@ class CarriedRegion:
     Attributes:
         volume: Exact volume of the workspace with the signs of home, in cubed design units.
         held_volume: Volume of the part, in cubed design units.
-        error: Estimate of the largest error of that, a thousandth of it or less.
+        error: Estimate of the largest error of that, without thin pieces between columns.
         find_solid: Function that computes the solid.
         best: If the part is empty, the position found with the least share of a limit, shape (3,).
         factor: The factor of the load, the payload's weight and its force that this position

@@ -60,11 +60,11 @@ AREA, AREA_ERROR, FILLED, SLICE = 4, 5, 6, 7
 # Panels along y, and along z of each slice, at first. To find a box about what is not empty: steps
 # between columns beside it, its growth on a side where what is not empty may go on, the share that
 # is left of the last box, and rounds at most.
-PANELS, BESIDE, GROWTH, SETTLED, ROUNDS = 16, 1.5, 0.5, 0.6, 12
+PANELS, BESIDE, GROWTH, SETTLED, ROUNDS = 16, 6.0, 0.5, 0.4, 12
 # Share of the tolerance that is left to slices, slices at most, and share of a box that is nothing.
 OF_SLICES, MOST_SLICES, NOTHING = 0.15, 1500, 1e-12
-# Factor of the error for what lies between the columns of the first panels.
-SAFETY = 1.5
+# Factor of the error: differences vanish by chance where a value bends twice.
+SAFETY = 2.0
 # Places of new slices over the width of half a panel.
 QUARTERS = np.array([0.25, 0.75, 1.25, 1.75])
 # Weights of Simpson's rule with five points, times 12, and of the two third differences of these.
@@ -476,7 +476,8 @@ class ColumnVolume(NamedTuple):
 
     Attributes:
         volume: Volume, in cubed design units.
-        error: Sum of the sizes of third differences of all panels, with a factor.
+        error: Sum of the sizes of third differences of all panels, with a factor. What lies between
+            the columns of the first panels does not count.
         box: (lows, highs) of a box about the columns that are not empty, shape (2, 3).
     """
 
