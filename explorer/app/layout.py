@@ -39,11 +39,7 @@ ANY_WIDTH, ANY_PLACE = 640, 80
 
 
 class Panels:
-    """The panels of the page, which hold the tabs.
-
-    Args:
-        gui: Controls of the page.
-    """
+    """The panels of the page, which hold the tabs."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._gui = gui
@@ -56,7 +52,11 @@ class Panels:
         """Return the tab of a place with a title, made at the first call with its button "?"."""
         key = (tab.place, tab.title)
         if key not in self._tabs:
-            panel = self._panel(tab)
+            if tab.place == "dialog":
+                panel = make_with_id(self._gui.add_panel, f"dialog {tab.title}")
+                panel.float(x=ANY_PLACE, y=ANY_PLACE, width=ANY_WIDTH)
+            else:
+                panel: viser.PanelHandle = getattr(self, tab.place)
             add_tab = partial(panel.add_tab, tab.title, tab.icon)
             self._tabs[key] = make_with_id(add_tab, f"tab {tab.title}")
             if manual:
@@ -70,19 +70,8 @@ class Panels:
         """Return the titles of the tabs in a place."""
         return [title for each, title in self._tabs if each == place]
 
-    def _panel(self, tab: Tab) -> viser.PanelHandle:
-        if tab.place != "dialog":
-            return getattr(self, tab.place)
-        dialog = make_with_id(self._gui.add_panel, f"dialog {tab.title}")
-        dialog.float(x=ANY_PLACE, y=ANY_PLACE, width=ANY_WIDTH)
-        return dialog
-
     def lay_out(self, client: viser.ClientHandle | None = None) -> None:
-        """Put the panels into their places, as they are at first.
-
-        Args:
-            client: The browser; None for all, also those to come.
-        """
+        """Put the panels of a browser, or of all also to come, where they are at first."""
 
         def of(panel: viser.PanelHandle) -> viser.PanelHandle:
             return panel if client is None else panel_in(client, panel)
@@ -96,14 +85,7 @@ class Panels:
 
 
 class Layout:
-    """Lays out the panels, and adapts the page to each new browser.
-
-    Args:
-        server: Server of the page.
-        buttons: Buttons of the page.
-        cameras: Cameras of the browsers.
-        panels: The panels, with all their tabs; None to show the scene alone.
-    """
+    """Lays out the panels, if the scene is not alone, and adapts the page to each new browser."""
 
     def __init__(
         self,
@@ -161,12 +143,7 @@ PRODUCT = (
 
 
 class Bar:
-    """The bar on top of the page, with the parts of the features side by side.
-
-    Args:
-        services: Services of the page.
-        features: Features of the page.
-    """
+    """The bar on top of the page, with the parts of the features side by side."""
 
     def __init__(self, services: Services, features: Sequence[Feature]) -> None:
         declared = [part for feature in features for part in feature.bar]

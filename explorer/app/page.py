@@ -172,8 +172,8 @@ class Page:
         self._scene = [self.services.get(part) for each in self._features for part in each.scene]
         # The process computes in the order of their requests. The scene alone needs those feeds
         # only of which it draws.
-        kinds = [kind for feature in self._features for kind in feature.feeds]
-        kinds += [kind for feature in self._features for kind in feature.later_feeds]
+        kinds = [kind for each in self._features for kind in each.feeds]
+        kinds += [kind for each in self._features for kind in each.later_feeds]
         self._feeds = [
             self.services.get(kind) for kind in kinds if panels or self.services.has(kind)
         ]
@@ -234,10 +234,8 @@ class Page:
         return panels
 
     def _add_palette(self, layout: Layout) -> Palette:
-        reset = Command(
-            "View › Reset layout", "Put the panels where they were at first.", layout.reset
-        )
-        self.services.commands.add(reset)
+        hint = "Put the panels where they were at first."
+        self.services.commands.add(Command("View › Reset layout", hint, layout.reset))
         for each in (command for feature in self._features for command in feature.commands):
             self.services.commands.add(each.of(self.session))
         return Palette(self._server, self.services.commands.all)

@@ -112,14 +112,7 @@ def start(
         stop_viser(server)
         raise _port_error(port)
     protect(server)
-    page = Page(
-        server,
-        state,
-        panels=panels,
-        user_data=user_data,
-        tour=tour,
-        studies=studies,
-    )
+    page = Page(server, state, panels=panels, user_data=user_data, tour=tour, studies=studies)
     guard.let_in()
     return Running(server, page, access)
 

@@ -46,11 +46,6 @@ class Services:
     """The services that the page offers to its features.
 
     Attributes:
-        server: Server of the scene and the controls.
-        session: Session to which changes are posted.
-        jobs: Processes for long computations.
-        buttons: Buttons in the markup of the page.
-        downloads: Sender of files to browsers.
         complain: Function that shows a problem to one client, or to all for None.
         tell: Function that shows a message to a client, or to all if none is given.
         theme: Theme of each browser, light or dark.
@@ -123,12 +118,9 @@ class Services:
         change_of: Callable[[str], Action | Change | HistoryMove | None],
         values: Container[str] | None = None,
     ) -> None:
-        """Register that presses on the buttons with a name change the state.
+        """Register that presses on the buttons with a name change the state, see `Buttons.on`.
 
-        Args:
-            name: The name, see `Buttons.on`.
-            change_of: Function from the value of a button to what its press does; None for nothing.
-            values: The values that a press may have; any if None.
+        The value of a button gives what its press does; None for nothing.
         """
 
         def press(value: str, client: viser.ClientHandle) -> None:
@@ -176,11 +168,8 @@ def follow_drags(
 def html_of(feed: AnyFeed, html: Callable[[Any], str], title: str, button: str = "") -> str:
     """Return the drawing of a feed as HTML, pale while it is outdated, or why there is none.
 
-    Args:
-        feed: The feed.
-        html: Function from its drawing to HTML.
-        title: Title of a failure.
-        button: Label of the button that repeats a cancelled computation.
+    The title is that of a failure; the label is of the button that repeats a cancelled
+    computation.
     """
     if feed.problem is not None:
         return problem(feed, title, button)
@@ -269,11 +258,9 @@ class FileExport:
     """Files of one thing in several formats, as the dialog Export offers them.
 
     Attributes:
-        title: Name of the thing, such as "Workspace".
         hint: Sentence on what the files hold.
         formats: Names of the formats, each that of a button.
         send: Function that sends a client a file in a format.
-        is_ready: Function that tells whether there is such a thing now.
     """
 
     title: str
@@ -294,22 +281,15 @@ class Feature:
         name: Name of its folder.
         manual: What the button "?" of its tabs opens in the manual, the file of a page with "#" and
             a heading of it; "" for no button. Tabs that features share have that of the first.
-        tabs: Its panels, in their order.
-        bar: Its parts of the bar on top of the page.
-        exports: The files that it offers.
         openers: Functions that open files, by a field that no other kind of file has; a file with
             none of these fields is a design.
-        scene: Classes of its parts of the scene.
         feeds: Feeds, which request drawings from the process of the page; `FeedOf` declares one.
         later_feeds: Feeds whose requests come after those of all features' `feeds`, since nobody
             waits for their results while the scene changes.
-        runners: Classes that do long work.
-        commands: Commands that have no control.
         passing: Function that returns the commands that come and go, such as those that open a
             saved design; the same object while they stay.
         floor: Function that returns the lowest height, in design units, of what is drawn in place
             of the schematic mechanism; None while that is drawn itself.
-        is_offered: Function that tells whether the page has the feature.
     """
 
     name: str

@@ -52,11 +52,10 @@ class At:
     action: type[Set] = Set
 
     def bound(self, name: str, options: Mapping[str, object] | None = None) -> ControlBinding[Any]:
-        """Return the binding.
+        """Return the binding of a control, whose label names the value in the history.
 
-        Args:
-            name: Name of the value in the history, such as the label of its control.
-            options: Values by the words of a list; None if the control holds the value itself.
+        The options of a list have their values by their words; a control without them holds
+        the value.
         """
         if options is not None:
             texts = {value: text for text, value in options.items()}

@@ -36,9 +36,6 @@ class Control(Generic[Value]):
     """An input of the page, bound to the state.
 
     Attributes:
-        session: Session to which changes are posted.
-        handle: The input.
-        bound: Binding of its value.
         disabled: Condition in which it is disabled; None for never.
         visible: Condition in which it is visible; None for always.
         step: Function that returns the step of its buttons; None for a fixed one, or none.

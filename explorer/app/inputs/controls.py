@@ -123,13 +123,8 @@ class Controls:
     ) -> None:
         """Add a range in one row: a slider with two thumbs, and a number field for each end.
 
-        Args:
-            label: Words beside it, short.
-            hint: Sentence on what it sets.
-            at: Binding of its ends, the lower one first; the fields may be given them in any order.
-            span: Function that returns the range of its track; values beyond can be typed.
-            power: Exponent of length, as in `slider`.
-            conditions: In which states it is disabled and visible.
+        The binding is to the ends, the lower one first; the fields may be given them in any
+        order. Values beyond the track can be typed; `power` is as in `slider`.
         """
         thumbs = self._gui.add_multi_slider(label, 0.0, 1.0, 0.01, (0.0, 1.0), marks=(), hint=hint)
         # The stylesheet puts the fields into the row of the thumbs, and a script names them.
@@ -152,16 +147,9 @@ class Controls:
         power: int = 0,
         **conditions: Unpack[Conditions],
     ) -> None:
-        """Add a number field; its step may follow the state.
+        """Add a number field; its step may follow the state, and its decimals are shown.
 
-        Args:
-            label: Words beside it, in which "{unit}" stands for the unit of lengths.
-            hint: Sentence on what it sets.
-            at: Source of its value.
-            least: Least value.
-            step: Step of its buttons, whose decimals are shown.
-            power: Exponent of length, as in `slider`; least value and step are in design units.
-            conditions: In which states it is disabled and visible.
+        `power` is as in `slider`; the least value and the step are in design units.
         """
         follows = step_in_unit(step, power) if power else step if callable(step) else None
         fixed = None if callable(step) else step
@@ -212,15 +200,9 @@ class Controls:
         is_in_palette: bool = False,
         **conditions: Unpack[Conditions],
     ) -> None:
-        """Add a list to choose from.
+        """Add a list to choose from, whose options may all be commands.
 
-        Args:
-            label: Words beside the list.
-            hint: Sentence on what it chooses.
-            options: Words of the options, with their values if `at` is a path.
-            at: Source of its value.
-            is_in_palette: Whether every option is a command.
-            conditions: In which states it is disabled and visible.
+        The options have their values if the source of the value is a path.
         """
         handle = self._gui.add_dropdown(label, tuple(options), hint=hint)
         values = options if isinstance(options, Mapping) else {text: text for text in options}
@@ -245,16 +227,7 @@ class Controls:
         main: bool = False,
         keys: tuple[Key, ...] = (),
     ) -> viser.GuiButtonHandle:
-        """Add a button that does an action.
-
-        Args:
-            label: Words on it.
-            hint: Sentence on what it does.
-            action: Function that returns the action.
-            icon: Icon before the words.
-            main: Whether it is the one filled button of its tab.
-            keys: Keys of its command.
-        """
+        """Add a button that does an action, the main one filled, and its command."""
         handle = self._gui.add_button(label, hint=hint, icon=icon, color=MAIN if main else None)
 
         @handle.on_click

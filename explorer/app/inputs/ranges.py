@@ -74,14 +74,10 @@ class Track:
     def span(
         self, state: State, values: tuple[float, ...], tinted: Intervals = (), *, is_own: bool
     ) -> Span:
-        """Return the range in a state.
+        """Return the range in a state, for the values of the thumbs and the tinted parts.
 
-        Args:
-            state: The state.
-            values: Values of the thumbs.
-            tinted: The tinted parts.
-            is_own: Whether the slider itself was changed last: then its range may only grow, so
-                that it holds still under the pointer, unless `of_state` has changed.
+        After a change of the slider itself, its own, the range may only grow, so that it
+        holds still under the pointer, unless `of_state` has changed.
         """
         whole = self.of_state if isinstance(self.of_state, Span) else self.of_state(state)
         span = whole
@@ -108,10 +104,6 @@ def tint_marks(intervals: Intervals, span: Span) -> tuple[float, ...]:
     """Return the ends of intervals within a range as marks, from which a stylesheet tints a track.
 
     The track is tinted from each mark of odd number to the next one.
-
-    Args:
-        intervals: The intervals.
-        span: Range of the slider.
     """
     return tuple(
         min(max(end, span.low), span.high)
@@ -122,12 +114,9 @@ def tint_marks(intervals: Intervals, span: Span) -> tuple[float, ...]:
 
 
 def close_up(whole: Span, intervals: Intervals, before: Span | None) -> Span:
-    """Return the part of a range around intervals, as wide again as they are.
+    """Return the part of a range around disjoint ascending intervals, as wide again as they are.
 
-    Args:
-        whole: The range.
-        intervals: The intervals, disjoint and ascending.
-        before: The part that was shown before, which stays as long as it serves; None if none was.
+    The part that was shown before, if any, stays as long as it serves.
     """
     inside = [(low, high) for low, high in intervals if low < whole.high and high > whole.low]
     if not inside:
@@ -146,12 +135,7 @@ def close_up(whole: Span, intervals: Intervals, before: Span | None) -> Span:
 def round_span(low: float, high: float, step: float) -> Span:
     """Return a range whose ends are whole multiples of ten steps, no narrower than asked for.
 
-    A slider's values are whole steps from its lower end.
-
-    Args:
-        low: Lower end.
-        high: Upper end.
-        step: Step of the slider, a power of ten.
+    The step is a power of ten, and a slider's values are whole steps from its lower end.
     """
     unit = 10.0 * step
     digits = -round(math.log10(unit))

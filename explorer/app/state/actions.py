@@ -82,11 +82,7 @@ class Open(Action):
     design: Design
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The design is being optimised.
-        """
+        """Return the next state; refuse while the design is being optimised."""
         state.check_free()
         kept = parts_kept_on_open(state.in_unit_of(self.design))
         return replace(open_state(self.design), **kept)
@@ -113,11 +109,10 @@ class SetName(Action):
     name: str
 
     def apply(self, state: State) -> State:
-        """Return the next state.
+        """Return the next state; refuse while the design is being optimised.
 
         Raises:
             DesignError: The name is blank, or not one printable line.
-            InputError: The design is being optimised.
         """
         state.check_free()
         return replace(state, design=msgspec.structs.replace(state.design, name=self.name))
@@ -157,12 +152,7 @@ class Set(Action):
     text: str = ""
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The state refuses the value, or it belongs to a design that is being
-                optimised.
-        """
+        """Return the next state; refuse a change of the design while it is being optimised."""
         if not self.at.startswith("design"):
             return with_value(state, self.at, self.value)
         state.check_free()

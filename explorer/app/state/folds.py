@@ -36,11 +36,7 @@ class SetFold(Action):
     value: float
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The coordinate is beyond its range.
-        """
+        """Return the next state; refuse a coordinate beyond its range."""
         index, value = self.index, self.value
         least = -HALF_TURN if index >= FIRST_FOLD else 0.0
         if index > 0 and not least <= value <= HALF_TURN:

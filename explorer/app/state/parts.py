@@ -1,10 +1,10 @@
 """Parts of the state: values by path, and what a file and another design leave of each.
 
 A path is such as "view.singular.ball", "view.tetrahedra.0" or, for a value of a feature's part,
-"studies.plan.count". Each field of the state, and of its
-parts, declares as its metadata what becomes of it when the state is saved, when another design is
-opened, and when the design unit changes. A field that declares nothing is saved, is that of a new
-state once another design is opened, and keeps its numbers in another unit.
+"studies.plan.count". Each field of the state, and of its parts, declares as its metadata what
+becomes of it when the state is saved, when another design is opened, and when the design unit
+changes. A field that declares nothing is saved, is that of a new state once another design is
+opened, and keeps its numbers in another unit.
 """
 
 from __future__ import annotations
@@ -121,11 +121,8 @@ def parts_kept_on_open(state: Any) -> dict[str, Any]:
 def in_unit(part: Whole, before: Unit, after: Unit, power: int = 1) -> Whole:
     """Return a part of the state with its lengths, which were in design units, in others.
 
-    Args:
-        part: A part whose fields declare lengths, a pose, or a length itself or several.
-        before: Unit of the page while design units were those of the part.
-        after: The same unit of the page with the new design units.
-        power: Exponent of length of a number.
+    A part has fields that declare lengths, or is a pose, or a length itself or several, to a
+    power. The unit of the page is given with the design units before and after.
     """
     value: Any = part
     if before.factor == after.factor:

@@ -90,11 +90,8 @@ class GivenFolds:
 class Gesture:
     """A move of the platform by one control, from press to release, in however many events.
 
-    Attributes:
-        start: The pose in which it began.
-        source: The control, for instance a slider.
-        last: Time of its last event, in seconds.
-        press: The last press of a browser that it was part of; None if it is not known.
+    It has the pose in which it began, the time of its last event in seconds, and the last press
+    of a browser that it was part of; None if that is not known.
     """
 
     start: Pose
@@ -108,7 +105,6 @@ class State:
     """The state, from which everything on the page follows.
 
     Attributes:
-        design: The manipulator.
         base: The design as it was opened, to which reset returns.
         pose: The last pose that closes.
         yaw_pitch_roll: The angles of the pose in degrees, as the user gave them.
@@ -116,7 +112,6 @@ class State:
         mode: The assembly mode; at a singular pose the one before it.
         hold: Whether the pose or the legs stay when the design changes.
         unclosed: Why the joints do not close; None if they do.
-        view: What is shown.
         taken: The joints that a length led to that was taken in the place of one that does not
             close, and why it was taken, a sentence; None if none was.
         gesture: The gesture that led to the pose; None if none did, as after a change of the

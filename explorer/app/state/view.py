@@ -23,14 +23,11 @@ class WorkspaceView:
     """How the constant-orientation workspace is shown.
 
     Attributes:
-        solid: Whether the solid is drawn.
         region: Whether the solid is all that is within the limits, its accessible part alone, or
             the part that holds the load.
         start: Whether the accessible part starts at the home position, or at the present one.
-        hull: Whether its convex hull is drawn.
         planes: Whether the planes of singular positions, up to three, are drawn.
         orientation: Whether the orientation is that of the present pose, or of the home pose.
-        colour: The quantity by which the surface is coloured.
         cut: The axis along which it is cut open, or None.
         level: The coordinate at which it is cut, in design units; None for the middle of its
             extent, which also counts where this is beyond it.
@@ -60,7 +57,6 @@ class OrientationView:
 
     Attributes:
         tilts: Whether the greatest tilts at nodes are drawn.
-        over: Which workspace over a range of orientations is drawn.
         range: Largest tilt from the orientation of home in that range, in degrees.
         turn: Largest change of torsion either way in that range, in degrees.
 
@@ -112,10 +108,8 @@ class ForcesView:
     """The load besides the payload, and how forces are shown.
 
     Attributes:
-        shown: Whether the forces are drawn.
         force: Force at the tool, along the axes of the base, in N.
         moment: Moment on the platform, along the axes of the base, in N m.
-        weighed: The bodies whose weights count.
         scale: Force whose arrow is as long as the reach, in N.
 
     Raises:
@@ -142,12 +136,10 @@ class PrecisionView:
         ellipsoid: Whether the ellipsoid of the tool's RMS error is drawn.
         deflected: Whether the mechanism is drawn as the load deflects it.
         times: Magnification of the drawn deflection; None for one that suits it.
-        budget: Whether the budget of the tolerances is computed.
         over: Positions of the budget: the present one, the required box, or the workspace.
         wanted: Largest displacement of the tool that the tolerances may cause, in mm; None for a
             ranking of the tolerances as they are.
         wanted_turn: Largest turn of the tool likewise, in degrees; None for any.
-        keep_actuators: Whether the errors of the actuators stay as they are.
 
     Raises:
         InputError: A magnification or a wanted precision that is not positive.
@@ -187,7 +179,6 @@ class SingularView:
         ghost: Which of the nearest singular poses is drawn.
         strata: Whether the diagram of the strata is drawn.
         ellipsoid: Which ellipsoid is drawn at the point, that of speeds or that of forces.
-        ball: Whether the largest ball without singular positions is drawn.
     """
 
     ghost: Ghost = "none"
@@ -210,20 +201,12 @@ class View:
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.
         tetrahedra: Whether each of the three is drawn, and the gap that is left to its incidence.
         leaves: Whether the two inner leaves are drawn, with the folds beside them.
-        clearance: Whether the closest pair of legs is marked.
-        machine: Whether the tool and the payload of the design are drawn.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
         radius_curve: Whether the accessible volume is drawn against the radius of the legs.
         ghosts: Whether the seven other assembly modes are drawn.
         warn_below: The length below which margins are warned of, in design units; distances
             are warned of below a share of it, see `explorer.measures.verdict`. None for a share of
             the reach.
-        prototype: How the prototype is shown.
-        workspace: How the workspace is shown.
-        orientation: What is drawn of the orientations over the workspace.
-        singular: How singularities are shown.
-        forces: The load besides the payload, and how forces are shown.
-        precision: How errors and the deflection are shown, and what is wanted of the tolerances.
 
     Raises:
         InputError: The warning length is not positive.

@@ -46,9 +46,6 @@ _DECODER = msgspec.json.Decoder(_Press)
 class Buttons:
     """The buttons in the markup of one page.
 
-    Args:
-        server: The server whose browsers show the page.
-
     Attributes:
         commands: The commands of the page; those that press a button are among them.
     """
@@ -72,10 +69,8 @@ class Buttons:
     def on(self, name: str, does: PressHandler, *, values: Container[str] | None = None) -> None:
         """Register the function that handles presses on the buttons with a name.
 
-        Args:
-            name: The name, unique in the page, such as "compare.open".
-            does: The function that handles a press.
-            values: The values that a press may have; any if None.
+        The name is unique in the page, such as "compare.open". A press may have any value
+        if none are given.
 
         Raises:
             ValueError: The name is registered.
@@ -94,15 +89,10 @@ class Buttons:
         *,
         keys: tuple[Key, ...] = (),
     ) -> None:
-        """Offer a press in the palette.
+        """Offer a press on the button with a name and a value in the palette.
 
-        Args:
-            label: The name of the command, from the tab to the option.
-            hint: Sentence on what it does.
-            name: The name of the button.
-            value: The value of the button.
-            is_ready: Function that tells whether it can be pressed now.
-            keys: Keys that press it.
+        The label names the command, from the tab to the option, and the hint is a sentence
+        on it. It can be run while `is_ready` says so.
         """
 
         def run(client: viser.ClientHandle) -> None:
@@ -211,26 +201,17 @@ def open_button(
 def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> str:
     """Return a figure of the bar as HTML, a button that opens the tab that explains it.
 
-    Args:
-        opens: Title of the tab.
-        name: Name of the figure.
-        value: Value with its unit, HTML.
-        hint: Sentence on what it measures.
-        look: Class of the value, such as "ex-close".
+    The value with its unit is HTML; `look` is its class, such as "ex-close".
     """
     content = f'<span class="ex-dim ex-small">{escape(name)}</span><b class="{look}">{value}</b>'
     return open_button(opens, content, hint=hint, class_name="ex-figure")
 
 
 def activity(opens: str, title: str, words: str, share: float | None, buttons: str) -> str:
-    """Return what runs or waits for an answer as HTML, for the bar.
+    """Return what runs or waits for an answer as HTML for the bar, with a button that opens a tab.
 
-    Args:
-        opens: Title of the tab that shows more of it.
-        title: What it is.
-        words: How far it is.
-        share: Share that is done, from 0 to 1; None if it is not known.
-        buttons: The buttons that end or answer it, HTML.
+    The share that is done, 0 to 1, is None if it is not known; the buttons that end or answer
+    it are HTML.
     """
     bar = "" if share is None else meter(100.0 * share, look="ex-meter is-thin")
     content = (
@@ -251,10 +232,7 @@ ICON = (
 def copy_button(buttons: Buttons, answer: str, source: Callable[[], Source]) -> str:
     """Add the button that copies how an answer is computed; return it as HTML.
 
-    Args:
-        buttons: Buttons of the page.
-        answer: Name of the answer, from the tab on, such as "Loads › Forces".
-        source: Function that returns how the present answer is computed.
+    The answer is named from the tab on, such as "Loads › Forces".
     """
     words, name = "Copy the command line", f"{answer.rsplit(STEP, maxsplit=1)[-1].lower()}.copy"
     buttons.on(name, lambda _, who: run_script_in(who, read_script("copies", source().text)))

@@ -113,14 +113,10 @@ def choose(at: str, value: str, name: str, words: str = "") -> Effect:
 
 
 class Chips:
-    """A row of small buttons.
+    """A row of small buttons, registered under a name such as "workspace.show".
 
-    Args:
-        buttons: Buttons of the page, among which the row is registered.
-        session: Session to which they post.
-        name: Name of the row among the buttons, such as "workspace.show".
-        title: Words before the row; "" for buttons that stand in other markup.
-        commands: The commands by the values that presses send.
+    The title stands before the row, "" for buttons in other markup; presses send the keys of
+    the commands.
     """
 
     def __init__(

@@ -24,12 +24,9 @@ File = tuple[str, bytes]
 
 
 class Downloads:
-    """Sends files, each to one browser.
+    """Sends files, each to one browser; those that need computing come from the page's process.
 
-    Args:
-        server: Server of the browsers.
-        jobs: The processes, of which that of the page makes files.
-        complain: Called with a message for people and the client it is for.
+    `complain` is called with a message for people and the client it is for.
     """
 
     def __init__(
@@ -58,16 +55,10 @@ class Downloads:
         arguments: tuple[Any, ...],
         notice: tuple[str, str] | None = None,
     ) -> None:
-        """Send a file that the process of the page makes.
+        """Send a file that the process of the page makes, by a task with its arguments.
 
-        It replaces one of the same name that waits for the same browser.
-
-        Args:
-            who: The browser.
-            name: Name of the file.
-            task: A function of that process.
-            arguments: Arguments of the task.
-            notice: Title and text that the browser shows meanwhile.
+        It replaces one of the same name that waits for the same browser, unless a notice,
+        of a title and a text, is shown there meanwhile.
         """
         client = self._client(who)
         if client is None:
@@ -91,13 +82,7 @@ class Downloads:
         self._jobs.start(task, arguments, done, failed, key=key)
 
     def make(self, who: Who, doing: str, make: Callable[[viser.ClientHandle], File]) -> None:
-        """Send a file that a thread makes with the browser.
-
-        Args:
-            who: The browser.
-            doing: Title of the notice that the browser shows meanwhile.
-            make: Makes the file.
-        """
+        """Send a file that a thread makes with the browser, which shows a notice meanwhile."""
         client = self._client(who)
         if client is None:
             return

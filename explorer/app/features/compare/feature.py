@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from typing import ClassVar
 
@@ -43,22 +44,18 @@ class Pin(Action):
     design: Design
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The design is pinned already, or no place is free.
-        """
-        pinned, name = Compared.of(state).pinned, self.design.name
-        slot = Compared.of(state).slot_of(self.design)
+        """Return the next state; refuse a design that is pinned already, or has no place."""
+        compared, name = Compared.of(state), self.design.name
+        slot = compared.slot_of(self.design)
         if slot is not None:
             raise InputError(
                 f"{name} is pinned already, as {SLOTS[slot]}; change it, or pin another design"
             )
-        if None not in pinned:
+        if None not in compared.pinned:
             raise InputError(
                 f"{name} cannot be pinned: {', '.join(SLOTS)} are taken; unpin one of them first"
             )
-        return with_value(state, f"compared.pinned.{pinned.index(None)}", self.design)
+        return with_value(state, f"compared.pinned.{compared.pinned.index(None)}", self.design)
 
 
 @dataclass(frozen=True)
@@ -126,6 +123,25 @@ LOOKS = (
 )
 
 
+def _open(slot: int, state: State) -> Open:
+    design = Compared.of(state).pinned[slot]
+    if design is None:
+        raise InputError(f"nothing is pinned as {SLOTS[slot]}; pin a design first")
+    return Open(design)
+
+
+PLACE_BUTTONS: tuple[tuple[str, Callable[[int, State], Action], str, str], ...] = (
+    ("open", _open, "Open pinned", "Make it the live design; undo brings back the present one."),
+    (
+        "unpin",
+        lambda slot, _: Unpin(slot),
+        "Unpin",
+        "Remove it from the comparison; undo brings it back.",
+    ),
+)
+"""Name, action, words and hint of the buttons of each pinned design."""
+
+
 class ComparePanel:
     """The table or bars of the compared designs, and buttons that pin and unpin them."""
 
@@ -157,49 +173,30 @@ class ComparePanel:
             "compare.pin",
             is_ready=lambda: None in Compared.of(self._session.state).pinned,
         )
-        places: tuple[tuple[str, Callable[[State, int], Action], str, str], ...] = (
-            (
-                "open",
-                _open,
-                "Open pinned",
-                "Make it the live design; undo brings back the present one.",
-            ),
-            (
-                "unpin",
-                lambda _, slot: Unpin(slot),
-                "Unpin",
-                "Remove it from the comparison; undo brings it back.",
-            ),
-        )
-        for verb, change, words, hint in places:
-            name = f"compare.{verb}"
-            services.do_on_press(
-                name,
-                lambda place, change=change: lambda state: change(state, SLOTS.index(place)),
-                SLOTS,
-            )
-            for slot, place in enumerate(SLOTS):
-                services.buttons.offer(
+        for verb, change, words, hint in PLACE_BUTTONS:
+            commands = {
+                place: StateCommand(
                     f"Compare › {words} design {place}",
                     hint,
-                    name,
-                    place,
-                    lambda slot=slot: Compared.of(self._session.state).pinned[slot] is not None,
+                    partial(change, slot),
+                    is_ready=lambda state, slot=slot: Compared.of(state).pinned[slot] is not None,
                 )
+                for slot, place in enumerate(SLOTS)
+            }
+            Chips(services.buttons, services.session, f"compare.{verb}", "", commands)
 
     def _page(
         self, state: State, columns: tuple[ComparedDesign, ...], choices: Mapping[str, Design]
     ) -> str:
-        look = Compared.of(state).look
-        pins = _pin_buttons(state, choices)
-        if Compared.of(state).is_empty:
+        compared, pins = Compared.of(state), _pin_buttons(state, choices)
+        if compared.is_empty:
             return box(
                 '<div class="ex-before">Pin this design, then change it: the copy stays beside it. '
                 "Or pin another one to compare this design with it. Up to three can be pinned; "
                 "their workspaces can be drawn over one another.</div>",
                 f'<div class="ex-flow">{pins}</div>',
             )
-        if look.shows == "table":
+        if compared.look.shows == "table":
             body = table(columns)
         else:
             legend = "".join(
@@ -231,26 +228,13 @@ class ComparePanel:
         return None if name and chosen is None else lambda state: Pin(chosen or state.design)
 
 
-def _open(state: State, slot: int) -> Open:
-    design = Compared.of(state).pinned[slot]
-    if design is None:
-        raise InputError(f"nothing is pinned as {SLOTS[slot]}; pin a design first")
-    return Open(design)
-
-
 def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
     """Return the buttons that pin the live design and others, as HTML."""
     compared = Compared.of(state)
     is_full = None not in compared.pinned
     hint = "All three places are taken: unpin one first" if is_full else "Keep a copy as it is now"
-    live = press_button(
-        "compare.pin",
-        "",
-        "Pin this design",
-        hint=hint,
-        class_name="ex-chip is-main",
-        is_disabled=is_full,
-    )
+    look, words = "ex-chip is-main", "Pin this design"
+    live = press_button("compare.pin", "", words, hint=hint, class_name=look, is_disabled=is_full)
     if is_full:
         return live
     others = (

@@ -17,14 +17,10 @@ Pinned: TypeAlias = tuple[Design | None, Design | None, Design | None]
 
 @dataclass(frozen=True)
 class CompareView:
-    """How designs are compared.
+    """How designs are compared: as a table or bars, in the scene over one another, or as outlines.
 
-    Attributes:
-        shows: Whether measures stand in a table or are drawn as bars.
-        overlay: Whether the workspaces are drawn over one another.
-        at_pose: Whether the workspace of the live design is drawn at its present orientation,
-            rather than at that of its home.
-        outlines: Whether the pinned designs are outlined in their home poses.
+    With `at_pose` the workspace of the live design has its present orientation, not that of
+    home.
     """
 
     shows: Literal["table", "bars"] = "table"

@@ -57,15 +57,10 @@ LOADS = ("home_load_share", "home_largest_payload", "home_largest_bending", "hel
 
 @dataclass(frozen=True)
 class ComparedDesign:
-    """A design in the comparison.
+    """A design in the comparison, by the number of its column; 0 is the live design.
 
-    Attributes:
-        number: Number of the column: 0 for the live design, from 1 for the pinned ones.
-        design: The design.
-        measured: Values of its measures; None until they are computed.
-        unit: Unit of lengths in the comparison, of one name for all columns.
-        is_current: Whether no newer values are being computed.
-        problem: Why something is missing; None if nothing is.
+    Its measures are None until they are computed. The unit of lengths has one name in all
+    columns, and the problem says why something is missing.
     """
 
     number: int
@@ -220,13 +215,9 @@ def measure_row(
 ) -> str:
     """Return the row of a measure in HTML: its values, and beside each its change from the first.
 
-    Args:
-        measure: The measure.
-        columns: Columns of the comparison.
-        label: Name of the row; that of the measure if "".
-        hint: Meaning of the row; that of the measure if "".
-        look: Classes of the stylesheet for the row.
-        change: Whether the changes keep or break a demand, where that is defined.
+    Name and meaning of the row are those of the measure if "". `look` has its classes of the
+    stylesheet; `change` tells whether the changes keep or break a demand, where that is
+    defined.
     """
     values = [column.value(measure) for column in columns]
     size, best, first = _size_of(values), best_of(measure, values), values[0]
@@ -278,11 +269,8 @@ def _exact_text(measure: Measure, column: ComparedDesign) -> str:
 
 def bars(columns: Sequence[ComparedDesign]) -> str:
     """Return some of the measures as bars from zero, in HTML."""
-    drawn = [CATALOGUE[name] for name in DRAWN]
-    drawn += [
-        CATALOGUE[name] for name in LOADS if any(each.has(CATALOGUE[name]) for each in columns)
-    ]
-    drawings = (_drawing(measure, columns) for measure in drawn)
+    loads = (name for name in LOADS if any(each.has(CATALOGUE[name]) for each in columns))
+    drawings = (_drawing(CATALOGUE[name], columns) for name in (*DRAWN, *loads))
     return f'<div class="ex-bars ex-small">{"".join(drawings)}</div>'
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -30,10 +30,6 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import Rgb
 from explorer.workspace.solids.solids import whole_solid
 
-if TYPE_CHECKING:
-    # The process of the worker needs no viser.
-    pass
-
 LIVE, NAMES = 0, ("live", *SLOTS)
 """The column of the live design, and the short names of all columns."""
 
@@ -44,13 +40,10 @@ NO_COLOUR: Rgb = (0, 0, 0)
 
 @dataclass(frozen=True)
 class ComparedRequest:
-    """Request to measure and draw a design; lengths in design units.
+    """Request to measure a design, and to draw its workspace; lengths in design units.
 
-    Attributes:
-        design: The manipulator.
-        drawn: Whether the workspace is drawn.
-        rotation: Rotation of the drawn workspace, rows of the matrix; None for the home pose.
-        tolerance: Chord tolerance of its mesh; None for a share of the reach.
+    The rotation of the drawn workspace, rows of its matrix, is that of the home pose if None;
+    the chord tolerance of its mesh a share of the reach.
     """
 
     design: Design
@@ -61,14 +54,10 @@ class ComparedRequest:
 
 @dataclass(frozen=True, eq=False)
 class ComparedDrawing:
-    """A design measured and drawn; lengths in design units.
+    """A design measured and drawn; lengths in design units, the outline of shape (n, 2, 3).
 
-    Attributes:
-        request: The request.
-        measurements: Values of the measures; None if they could not be computed.
-        shell: Surface of the workspace; None if it was not requested or is empty.
-        outline: Lines along base, legs and platform in the home pose, shape (n, 2, 3).
-        problem: Why something is missing; None if nothing is.
+    The measurements are None if they could not be computed, the shell if no workspace was
+    requested or it is empty. The problem says why something is missing.
     """
 
     request: ComparedRequest

@@ -22,7 +22,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import open_geometry
 from explorer.app.state.view import View
 from explorer.app.storage.library import LibraryFile, copy_name
-from explorer.app.widgets.buttons import PressHandler, open_button, press_button
+from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.markup import box, note
 from explorer.errors import ExplorerError, InputError
 from explorer.files.json_text import field_names
@@ -154,16 +154,16 @@ class SavedDesigns:
             except ExplorerError as error:
                 self._services.complain(str(error), who)
         self.entries = self._library.list()
-        self.commands = tuple(self._command(each) for each in self.entries if each.design)
+        self.commands = tuple(
+            Command(
+                f"Designs › Open {name}",
+                "Open this saved design.",
+                lambda client, name=name: self.open(name, client.client_id),
+            )
+            for name in (each.name for each in self.entries if each.design)
+        )
         self.last_deleted = self._library.last_deleted
         self._session.redraw()
-
-    def _command(self, entry: LibraryFile) -> Command:
-        return Command(
-            f"Designs › Open {entry.name}",
-            "Open this saved design.",
-            lambda client: self.open(entry.name, client.client_id),
-        )
 
 
 def open_design(_: Services, data: bytes, name: str) -> tuple[Action, str]:
@@ -193,18 +193,20 @@ class DesignName:
         mark, words = saved_words(live, self._saved.find(live.name))
         content = f'{name}<span class="ex-dim ex-small">{mark}</span>'
         hint = f"{words} Save, rename, open or upload designs."
-        return open_button("Designs", content, hint=hint, class_name="ex-name") + self._warning()
+        opens = open_button("Designs", content, hint=hint, class_name="ex-name")
+        problem, look = self._problem, "ex-tool ex-outlined ex-beyond"
+        if problem is None:
+            return opens
+        return opens + press_button(UNSAVED, "", UNSAVED_LABEL, hint=problem, class_name=look)
 
-    def _warning(self) -> str:
-        """Return the button that warns of an unsaved session, as HTML; "" while it is saved."""
-        if self._autosaver is None or self._autosaver.problem is None:
-            return ""
-        hint, look = self._autosaver.problem, "ex-tool ex-outlined ex-beyond"
-        return press_button(UNSAVED, "", UNSAVED_LABEL, hint=hint, class_name=look)
+    @property
+    def _problem(self) -> str | None:
+        """Why the session is not saved; None while it is, or if nothing is."""
+        return None if self._autosaver is None else self._autosaver.problem
 
     def _show_problem(self, client: viser.ClientHandle) -> None:
-        if self._autosaver is not None and self._autosaver.problem is not None:
-            client.add_notification(UNSAVED_LABEL, self._autosaver.problem, color="orange")
+        if self._problem is not None:
+            client.add_notification(UNSAVED_LABEL, self._problem, color="orange")
 
 
 def saved_words(live: Design, saved: Design | None) -> tuple[str, str]:
@@ -222,7 +224,7 @@ class DesignsPanel:
     """The live design's name, buttons that save it, and the list of all designs."""
 
     def __init__(self, services: Services) -> None:
-        gui, session, buttons = services.gui, services.session, services.buttons
+        gui, session = services.gui, services.session
         self._session = session
         self._saved = saved = services.get(SavedDesigns)
         self._controls = Controls(services)
@@ -275,11 +277,15 @@ class DesignsPanel:
         )
         self.restore.on_click(lambda event: saved.restore(event.client_id))
         services.commands.offer(self.restore, _run(saved.restore))
-        buttons.on("designs.open", self._for_row(self._open))
-        buttons.on("designs.duplicate", self._for_row(self._duplicate))
-        buttons.on("designs.delete", self._for_row(lambda row, _: self._set_asked(row.name)))
-        buttons.on("designs.confirm", self._for_row(self._delete))
-        buttons.on("designs.keep", self._for_row(lambda _, __: self._set_asked(None)))
+        acts: dict[str, Callable[[LibraryFile, Who], None]] = {
+            "open": self._open,
+            "duplicate": self._duplicate,
+            "delete": lambda row, _: self._set_asked(row.name),
+            "confirm": self._delete,
+            "keep": lambda _, __: self._set_asked(None),
+        }
+        for name, act in acts.items():
+            services.buttons.on(f"designs.{name}", partial(self._press, act))
         # Name of the design that the page asks whether to delete.
         self.asked: str | None = None
         self._listed: tuple[object, ...] = ()
@@ -325,14 +331,13 @@ class DesignsPanel:
         self.asked = name if name not in PRESETS else None
         self._session.redraw()
 
-    def _for_row(self, action: Callable[[LibraryFile, Who], None]) -> PressHandler:
-        def press(name: str, client: viser.ClientHandle) -> None:
-            rows = rows_of(self._saved.entries)
-            row = next((row for row in rows if row.name == name), None)
-            if row is not None:
-                action(row, client.client_id)
-
-        return press
+    def _press(
+        self, act: Callable[[LibraryFile, Who], None], name: str, client: viser.ClientHandle
+    ) -> None:
+        for row in rows_of(self._saved.entries):
+            if row.name == name:
+                act(row, client.client_id)
+                return
 
 
 def rows_of(entries: Sequence[LibraryFile]) -> tuple[LibraryFile, ...]:

@@ -183,8 +183,7 @@ STEPS = (
 class Tour:
     """The progress of a tour: its step, the frame in which it began, and whether it is done.
 
-    Attributes:
-        result: What the search of the last step has reached; "" without one.
+    Its result is what the search of the last step has reached, "" without one.
     """
 
     at: int

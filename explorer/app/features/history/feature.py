@@ -266,22 +266,14 @@ class ChangeScene(ScenePart):
 
 @dataclass(frozen=True)
 class OpenSession(Open):
-    """Open the design of a session as it was left there.
-
-    Attributes:
-        history: The history of that session.
-    """
+    """Open the design of a session as it was left there, by the history of that session."""
 
     template: ClassVar[str] = "Open the session of {design}"
 
     history: History
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The design is being optimised.
-        """
+        """Return the next state; refuse while the design is being optimised."""
         return replace(self.history.restore(state).step.state, view=self.history.step.state.view)
 
 

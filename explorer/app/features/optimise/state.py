@@ -32,11 +32,9 @@ class OptimisationRequest:
     """What the user requests; lengths in design units.
 
     Attributes:
-        objective: Name of the objective.
         volume: Volume to match, or the least one; None for one that suits the design.
         reach: Largest reach; None for that of the design.
         free: Names of what may change, out of `VARIABLES`, `YAW` and `PLACE`.
-        starts: Number of designs to start from.
         with_box: Whether a box must lie within the workspace, whatever the objective.
         box: The required box; None for one that suits the design.
         clearance, held, error, deflection, acceleration, tilt: As in `Demands`; 0 for no demand.
@@ -101,10 +99,6 @@ class SearchResult:
     Attributes:
         status: That of the outcome; "failed" if there is none.
         message: One line for people, in which `REACHED` stands for the objective with its name.
-        best: The best iterate; None if there is none.
-        starts: Number of starts that were tried.
-        converged: Number of starts that converged.
-        seconds: Duration in seconds.
         record: Record from which to repeat the run; None if it was killed or failed.
     """
 
@@ -123,14 +117,11 @@ class SearchRun:
 
     Attributes:
         number: Number of the run, from 1.
-        problem: The problem that it solves.
-        starts: Number of designs to start from.
         own: The state before the run, to which cancelling returns.
         phase: Whether it is running, was told to end, or has ended.
         iterates: The iterates shown so far; the last one is drawn.
         verdict: How it ended; None until then.
         comparison: Measures of the own and the optimised design; None until they are known.
-        accepted: Whether the result was accepted.
 
     Raises:
         InputError: A run within the state before it, or one that has ended without a verdict.
@@ -171,13 +162,7 @@ class SearchRun:
 
 @dataclass(frozen=True)
 class Optimisation(FeaturePart, name="optimisation"):
-    """The request for an optimisation, and its last run.
-
-    Attributes:
-        request: What the user requests.
-        run: The last run; None if there is none of this design.
-        count: Number of runs so far.
-    """
+    """The request for an optimisation, its last run, and the number of runs so far."""
 
     request: OptimisationRequest = field(default_factory=OptimisationRequest, metadata=LENGTHS)
     run: SearchRun | None = None

@@ -58,11 +58,7 @@ def send_picture(
 ) -> None:
     """Send the view of a browser as PNG, drawn by that browser.
 
-    Args:
-        services: Services of the page.
-        size: Width and height in pixels, or a factor on the size in the browser.
-        who: Client of the browser.
-        transparent: Whether the scene has no background.
+    The size is width and height in pixels, or a factor on the size in the browser.
     """
 
     def make(client: viser.ClientHandle) -> File:

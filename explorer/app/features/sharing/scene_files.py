@@ -84,15 +84,9 @@ def scene_html(
     date: dt.date,
     dark: bool = False,
 ) -> bytes:
-    """Return the scene of a server as one HTML file.
+    """Return the scene of a server as one HTML file, with a caption that has the date.
 
-    Args:
-        server: Server of the scene.
-        state: State of the scene.
-        camera: Camera of the opened file.
-        colours: Messages that give nodes the colours of the theme.
-        date: Date in the caption.
-        dark: Whether the file is dark.
+    The messages `colours` give nodes the colours of the theme.
     """
     scripts: list[SceneMessage] = [
         {"type": "RunJavascriptMessage", "source": read_script(name)} for name in SCRIPTS
@@ -185,12 +179,8 @@ def view_picture(
 ) -> bytes:
     """Return the view of a browser as PNG without the drag handle, once the browser has drawn it.
 
-    A picture narrower than the view shows more above and below, so that nothing is lost.
-
-    Args:
-        client: The browser.
-        size: Width and height in pixels.
-        background: Colour of the background; None for a transparent one.
+    A picture narrower than the view shows more above and below, so that nothing is lost. The
+    size is in pixels; without a background the picture is transparent.
 
     Raises:
         NoAnswerError: The browser is gone, hidden, or cannot draw that much.

@@ -42,11 +42,7 @@ class BrushAxes(Action):
     brushes: tuple[Brush, ...]
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: Too many ranges, or one without numbers.
-        """
+        """Return the next state; refuse too many ranges, and ranges without numbers."""
         studies = Studies.of(state)
         for brush in self.brushes:
             _check_ranges(brush)
@@ -66,12 +62,7 @@ def free_axes(state: State) -> BrushAxes:
 
 @dataclass(frozen=True)
 class PickDesign(Open):
-    """Open the design of a row of the open study.
-
-    Attributes:
-        index: Index of the design in its study.
-        study: Name of the study.
-    """
+    """Open the design with an index in a study, which must be the open one."""
 
     template: ClassVar[str] = "Pick {design}"
 
@@ -79,11 +70,7 @@ class PickDesign(Open):
     study: str = ""
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The design is being optimised, or another study is open by now.
-        """
+        """Return the next state; refuse a design of another study than the open one."""
         if Studies.of(state).name != self.study:
             raise InputError(f"the study {self.study!r} is not open any more")
         return with_value(super().apply(state), "studies.picked", self.index)

@@ -73,14 +73,9 @@ Pixels = Annotated[float, msgspec.Meta(gt=0.0)]
 
 
 class PlotEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a pointer does to a plot.
+    """What a pointer does to a plot, from the start to the end of its way; the size is in pixels.
 
-    Attributes:
-        study: Name of the study of the plot.
-        plot: Name of the plot.
-        act: Read or pick the design at a place, brush the axes of a box, or free all axes.
-        start, end: Places where it begins and ends.
-        size: Width and height of the plot, in pixels.
+    It reads or picks the design at the end, brushes the axes of a box, or frees all axes.
     """
 
     study: str

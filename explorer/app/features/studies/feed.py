@@ -43,8 +43,6 @@ class StudyDrawing:
 
     Attributes:
         studies: Open study, brushes, axes and pick; without the plan, which changes nothing.
-        results: All rows so far.
-        lengths: Unit in which lengths are written.
         front: Rows on the Pareto front, the best in the first objective first.
         inside: Whether each row lies within all brushes, shape (n,).
         plotted: Rows and axes of the plots; None while there is nothing to show.
@@ -73,13 +71,7 @@ class StudyDrawing:
 
 
 class StudyFeed(Feed[Request, StudyDrawing]):
-    """The feed of the open study, and the names of all studies.
-
-    Args:
-        folders: Folders of the studies.
-        jobs: The processes, of which that of the page reads and draws.
-        redraw: Called when there is a new drawing or another list.
-    """
+    """The feed of the open study, and the names of all studies; each change calls `redraw`."""
 
     def __init__(self, folders: StudyFolders, jobs: Jobs, redraw: Callable[[], None]) -> None:
         super().__init__(FeedOf(draw_study, self._request_of, in_scene=False), jobs, redraw)
@@ -162,12 +154,7 @@ def reasons(results: Results) -> tuple[tuple[str, str, int], ...]:
 
 
 def sort_front(results: Results, front: BoolArray) -> IntArray:
-    """Return the rows on the front, the best in the first objective first.
-
-    Args:
-        results: All rows.
-        front: Whether each row is on the front, shape (n,).
-    """
+    """Return the rows on the front, given for each row, the best in the first objective first."""
     rows = np.flatnonzero(front)
     if not len(rows):
         return rows

@@ -72,11 +72,8 @@ class PlotRows:
     """Rows and axes of the plots of a study.
 
     Attributes:
-        results: All rows.
-        lengths: Unit in which lengths are written.
         front: Whether each row is on the Pareto front, shape (n,).
         inside: Whether each row lies within all brushes, shape (n,).
-        studies: Open study, brushes, axes and pick.
         axes: Variables and measures that differ between rows.
         across, up: Axes of the points, from left to right and from bottom to top.
         colour: Axis that colours the plots.
@@ -152,11 +149,7 @@ def select_rows(
 ) -> PlotRows | None:
     """Return the rows and axes of the plots; None while there is nothing to draw.
 
-    Args:
-        results: All rows.
-        lengths: Unit in which lengths are written.
-        front: Whether each row is on the Pareto front, shape (n,).
-        studies: Open study, brushes, axes and pick.
+    `front` tells of each row whether it is on the Pareto front, shape (n,).
     """
     columns, study = results.columns, results.study
     is_measured = np.isin(columns["status"].astype(str), MEASURED)
@@ -205,12 +198,9 @@ def select_rows(
 
 
 def thin_out(rows: IntArray, keep: BoolArray, most: int) -> IntArray:
-    """Return at most `most` rows, ascending, preferring those to keep.
+    """Return at most `most` of some ascending rows, shape (n,), preferring those to keep.
 
-    Args:
-        rows: Rows, ascending, shape (n,).
-        keep: Whether each is to stay, shape (n,); they are thinned out too if more than `most`.
-        most: Largest number of rows returned.
+    Those to keep are thinned out too if they are more than `most`.
     """
     if len(rows) <= most:
         return rows
@@ -232,14 +222,7 @@ def _has_spread(values: FloatArray) -> bool:
 
 
 def row_at(plotted: PlotRows, plot: PlotName, place: Place, size: Place) -> int | None:
-    """Return the row drawn nearest to a place on a plot; None if none is near.
-
-    Args:
-        plotted: Rows and axes of the plots.
-        plot: Name of the plot.
-        place: The place.
-        size: Width and height of the plot, in pixels.
-    """
+    """Return the row drawn nearest to a place on a plot, sized in pixels; None if none is near."""
     rows = plotted.rows[plot]
     corners, at = plotted.places(plot, rows) * size, np.multiply(place, size)
     start = corners[:, :-1] if plot == "lines" else corners

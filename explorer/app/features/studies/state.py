@@ -35,12 +35,7 @@ PARTS = 40
 
 @dataclass(frozen=True)
 class Brush:
-    """A filter on one axis: values must lie within one of its ranges, ends included.
-
-    Attributes:
-        axis: The name of a variable or measure.
-        ranges: Low and high end of each range; at least one range.
-    """
+    """A filter on one axis: values must lie within one of its ranges, ends included."""
 
     axis: str
     ranges: tuple[Range, ...]
@@ -56,10 +51,8 @@ class StudyPlan:
     """A small study around the live design.
 
     Attributes:
-        count: Number of designs.
         percent: How far each variable varies, in per cent.
         variables: Names of the variables that vary, out of `NAMES` of a study.
-        measures: Names of the measures.
         objectives: Measures that span the Pareto front, each with its sense.
     """
 
@@ -99,13 +92,10 @@ class Studies(FeaturePart, name="studies"):
 
     Attributes:
         name: Name of the open study; None if none is.
-        brushes: The filters, at most one for each axis.
         across, up: Names of the axes of the scatter plot; None for the first two objectives.
         colour: Name of what colours both plots; None for the first objective.
         logarithmic: Whether axes with positive values alone are logarithmic.
-        front_only: Whether the plots show the designs of the Pareto front alone.
         picked: Index of the design that was picked last.
-        plan: The small study that can be started.
     """
 
     name: str | None = None
@@ -129,14 +119,10 @@ class Studies(FeaturePart, name="studies"):
 
 
 def within(columns: Mapping[str, Any], brushes: tuple[Brush, ...]) -> BoolArray:
-    """Return which rows lie within all brushes, shape (n,).
+    """Return which rows lie within all brushes, shape (n,), given columns of this shape by name.
 
     A row lies within a brush if its value lies in one of the ranges, ends included; a missing
     value (NaN) lies in none. Brushes of axes that a study does not have are passed over.
-
-    Args:
-        columns: Columns by name, shape (n,) each, with the index among them.
-        brushes: The filters, at most one for each axis.
     """
     chosen = np.ones(len(columns["index"]), dtype=np.bool_)
     for brush in brushes:
@@ -175,12 +161,7 @@ def range_around(design: Design, name: str, percent: float) -> Range:
 
 
 def study_around(design: Design, plan: StudyPlan, name: str) -> sweeps.Study:
-    """Return a small study around a design.
-
-    Args:
-        design: The design.
-        plan: The variables and measures.
-        name: Name of the study.
+    """Return a small study around a design, with the name given.
 
     Raises:
         InputError: No variable or no measure, or a number that is out of its range.

@@ -47,9 +47,7 @@ BUTTONS = {
 def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
     """Return how far a study is and what its plots show, as HTML.
 
-    Args:
-        drawing: The study.
-        is_running: Whether it is being computed, so that its progress stands elsewhere.
+    While it is running, its progress stands elsewhere.
     """
     study, count = drawing.results.study, drawing.results.count
     total = "" if drawing.is_complete else f" of {format_number(study.count)}"
@@ -131,14 +129,7 @@ def run_words(run: StudyRun) -> str:
 def head(
     drawing: StudyDrawing | None, run: StudyRun | None, plan: StudyPlan | None, design: str
 ) -> str:
-    """Return the lines on top of the tab as HTML.
-
-    Args:
-        drawing: The open study; None if none is, or before its first drawing.
-        run: The study that is being computed; None if none is.
-        plan: The new study that is being set up; None if none is.
-        design: Name of the live design.
-    """
+    """Return the lines on top of the tab as HTML: of the open, the computed and the new study."""
     parts: list[str] = []
     if run is not None:
         parts.append(f"<div>{run_words(run)}</div>{meter(100.0 * run.share)}")
@@ -155,13 +146,10 @@ def head(
 
 
 def acts(run: StudyRun | None, looks: str, *, is_new: bool, can_go_on: bool) -> str:
-    """Return the buttons at the top of the tab as HTML.
+    """Return the buttons at the top of the tab as HTML, with those that say how plots look.
 
-    Args:
-        looks: Switches of how the open study is drawn, HTML.
-        run: The study that is being computed; None if none is.
-        is_new: Whether a new study is being set up.
-        can_go_on: Whether designs of the open study are missing.
+    The study that is computed is None if none is, and `can_go_on` if the open one lacks
+    designs.
     """
     if is_missing("study"):
         buttons = extra_button("study") + ("" if is_new else _button("new"))
@@ -196,13 +184,7 @@ def legend(drawing: StudyDrawing) -> str:
 
 
 def window(rows: IntArray, picked: int | None, indices: IntArray) -> IntArray:
-    """Return the rows of the front in the table: those about the picked one, or the first.
-
-    Args:
-        rows: Rows of the front, in order.
-        picked: Index of the picked design, or None.
-        indices: Indices of the designs of all rows.
-    """
+    """Return the rows of the front in the table: those about the picked one, or the first."""
     places = np.flatnonzero(indices[rows] == (-1 if picked is None else picked))
     start = 0 if not len(places) else int(places[0]) - ROWS // 2
     start = max(0, min(start, len(rows) - ROWS))
@@ -264,13 +246,7 @@ def _line(drawing: StudyDrawing, row: int, values: Sequence[str]) -> str:
 
 
 def chips(plan: StudyPlan, design: Design, lengths: Unit) -> str:
-    """Return the switches of the variables and measures of a new study, as HTML.
-
-    Args:
-        plan: The new study.
-        design: The design it is around, whose machine may allow more of them.
-        lengths: Unit in which lengths are written.
-    """
+    """Return the switches of what a new study around a design varies and measures, as HTML."""
     variables, measures = choices_for(design, plan)
     varying = "".join(
         _chip(

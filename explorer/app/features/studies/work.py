@@ -37,14 +37,7 @@ DIED = "the study's process died; finished designs are kept; press Continue the 
 
 @dataclass(frozen=True)
 class StudyRun:
-    """A study that is being computed.
-
-    Attributes:
-        name: Name of its folder.
-        study: The study.
-        progress: Progress; None before the first report.
-        is_cancelled: Whether it is to end.
-    """
+    """A study that is being computed in the folder with its name; no progress is known at first."""
 
     name: str
     study: Study
@@ -61,11 +54,6 @@ def run_in_worker(study: Study, folder: Path, channel: Channel) -> Progress:
     """Compute the missing designs of a study, and send the progress after each part.
 
     One core remains for the page.
-
-    Args:
-        study: The study.
-        folder: Folder of its results.
-        channel: Channel to the parent.
 
     Raises:
         InputError: The study cannot be run, or the folder is another's or in use.
@@ -93,13 +81,7 @@ def study_feed(services: Services) -> StudyFeed:
 
 
 class StudyRunner:
-    """Starts, cancels and continues studies of the page.
-
-    Args:
-        session: Session in which studies are opened.
-        feed: Drawings of the studies, renewed with new results.
-        jobs: The processes, of which one of its own computes studies.
-        complain: Called with a message and the client that it is for.
+    """Starts, cancels and continues studies of the page, in a process of their own.
 
     Attributes:
         run: The study that is being computed; None if none is.
@@ -121,13 +103,7 @@ class StudyRunner:
         self._drawn = 0.0
 
     def start(self, design: Design, plan: StudyPlan, who: Who = None) -> None:
-        """Start a small study around a design, and open it.
-
-        Args:
-            design: The design.
-            plan: Variables and measures of the study.
-            who: Client that gets the message if it cannot be started.
-        """
+        """Start a small study around a design, and open it, or tell the client why it cannot be."""
 
         def make() -> tuple[str, Study, Path]:
             folder = self.feed.folders.new(design.name)

@@ -47,17 +47,14 @@ IN_SLICE = 1e-3
 
 @dataclass(frozen=True)
 class SliceMap:
-    """The map of a slice, without its axes.
+    """The map of a slice across an axis, without its axes; lengths in design units.
 
     Attributes:
-        axis: Axis across which the slice is cut.
-        level: Coordinate of the slice on this axis, in design units.
-        lows, highs: Ends of the map on the two other axes, in design units.
+        lows, highs: Ends of the map on the two other axes.
         own_scale: The map's own points per design unit.
         markup: The map as SVG, from its lows, y upwards.
         left_out: Words for positions within the limits beyond the part that is drawn.
-        colouring: Colouring by the measure of the map.
-        offset: Vector from b4 to the point of which the map is, shape (3,), in design units.
+        offset: Vector from b4 to the point of which the map is, shape (3,).
     """
 
     axis: Axis
@@ -130,14 +127,8 @@ def slice_map(
 ) -> SliceMap:
     """Return the map of a slice through a workspace that is not empty.
 
-    Args:
-        colouring: Colouring of the workspace by a measure; margins where that is plain.
-        extent: Lows and highs of the workspace within the limits.
-        axis: Axis across which the workspace is cut.
-        level: Coordinate of the cut on that axis.
-        whole: Cut solid of the workspace within the limits; None if all of it is drawn.
-        part: Cut solid of the part that is drawn; None likewise.
-        left_out: Words for positions within the limits beyond that part.
+    The extent is that of the workspace within the limits. Where only a part of it is drawn, the
+    cut solids of the whole and of the part are given, with words for what is left out of it.
     """
     slices = Slices.of(colouring.workspace, extent, colouring.bands)
     first, second = in_plane(axis)

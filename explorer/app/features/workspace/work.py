@@ -67,7 +67,6 @@ class Selection:
     """The workspace or the part of it that is drawn or exported.
 
     Attributes:
-        design: The manipulator.
         rotation: Rows of the matrix, platform to base.
         region: All that is within the limits, its accessible part, or the part that holds the load.
         start: Position where paths start; None for home.
@@ -175,16 +174,10 @@ def measure_volume(request: Selection) -> MeasuredVolume:
 
 @dataclass(frozen=True, kw_only=True)
 class WorkspaceRequest(Selection):
-    """Request to draw and measure a workspace.
+    """Request to draw and measure a workspace; lengths in design units.
 
-    Attributes:
-        colour: Measure that colours the surface.
-        cut: Axis across which the solid is cut open, or None.
-        level: Coordinate of the cut; None, or one beyond the extent, for the middle.
-        flipped: Whether the side is kept that faces the isometric camera.
-        tolerance: Chord tolerance, in design units.
-        hull: Whether to make the convex hull.
-        warn_below: Length below which margins raise a warning.
+    The level of a cut is in the middle if it is None or beyond the extent. A flipped cut keeps
+    the side that faces the isometric camera. Margins below `warn_below` raise a warning.
     """
 
     colour: Measure
@@ -210,15 +203,11 @@ class WorkspaceDrawing:
     """A workspace drawn and measured.
 
     Attributes:
-        hull: Convex hull, if requested.
-        slice_map: Map of the slice, if the solid is cut.
         volume: Exact volume within the limits, see `explorer.workspace.slices.volume`.
         part: Numbers of the part that is drawn; None for all within the limits.
         trouble: Why nothing is accessible or holds the load, if all within the limits is drawn
             instead.
-        mesh_volume: Volume of the uncut solid.
         mesh_agrees: Whether the volume of the solid within the limits agrees with the exact one.
-        hull_volume: Volume of the hull, if requested.
         extent: (lows, highs) of the solid; None if it is empty.
         nodes: The paper's node count within the limits; None if the grid is too fine.
         levels: The measure that colours the map at the edge of each band, see
@@ -339,12 +328,8 @@ def export_mesh(
 ) -> bytes:
     """Return a file of the "workspace" or of its "hull", in millimetres.
 
-    Args:
-        selection: The workspace or the part of it.
-        tolerance: Chord tolerance.
-        what: The workspace or its hull.
-        file_format: A format of `explorer.export.mesh`, or `STEP` for the workspace itself.
-        offset: Vector from b4 to the tool point, of which the positions are; None for b4.
+    The format is one of `explorer.export.mesh`, or `STEP` for the workspace itself. The
+    positions are those of b4, or of the tool point, which lies at an offset from it.
 
     Raises:
         ExplorerError: An empty workspace, nothing accessible, a load that nothing holds, a missing
