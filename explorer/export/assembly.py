@@ -15,10 +15,10 @@ from typing import Any
 from explorer.export import mesh, opencascade as cad
 from explorer.files.writing import zip_bytes
 from explorer.motion.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE
+from explorer.numerics.rgb import Rgb
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.shapes import forms_of
 from explorer.prototype.sizes import Sizes
-from explorer.singularity.colours import Rgb
 
 COLOURS: Mapping[str, Rgb] = MappingProxyType(
     {

@@ -25,7 +25,7 @@ from explorer import __version__
 from explorer.errors import ExplorerError, InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import Rgb, linear
+from explorer.numerics.rgb import Rgb, linear
 from explorer.workspace.solids.solid import Solid
 
 APPLICATION = f"flagged-explorer {__version__}"

@@ -20,6 +20,7 @@ from explorer.legs.clearance import PAIRS, pair_name
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Swing
 from explorer.mechanism.feasible_intervals import possible_ranges
 from explorer.mechanism.margins import INCIDENCES
+from explorer.prototype import body_colours
 from explorer.singularity import colours
 from explorer.workspace.limits import quantities
 
@@ -103,20 +104,20 @@ def page_data(design: Design) -> dict[str, Any]:
             }.items()
         },
         "colours": {
-            "tube": colours.TUBE,
-            "rod": colours.ROD,
-            "joint": colours.JOINT,
-            "ball": colours.BALL,
-            "base": colours.BASE_BODY,
-            "platform": colours.PLATFORM_BODY,
-            "rail": colours.RAIL,
-            "carriage": colours.CARRIAGE,
-            "leaves": colours.LEAVES,
+            "tube": body_colours.TUBE,
+            "rod": body_colours.ROD,
+            "joint": body_colours.JOINT,
+            "ball": body_colours.BALL,
+            "base": body_colours.BASE_BODY,
+            "platform": body_colours.PLATFORM_BODY,
+            "rail": body_colours.RAIL,
+            "carriage": body_colours.CARRIAGE,
+            "leaves": body_colours.LEAVES,
             "singular": colours.SINGULAR,
             "warned": colours.WARNED,
             "clear": colours.CLEAR,
             "far": colours.FAR,
-            "alarm": colours.OUTLINE,
+            "alarm": body_colours.OUTLINE,
             "margins": colours.MARGIN_COLOURS,
         },
     }

@@ -21,8 +21,8 @@ from explorer.export.mesh import printable_name
 from explorer.files.extras import load_extra
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.rgb import Rgb, linear
 from explorer.prototype.shapes import Circle, ShapeMaker
-from explorer.singularity.colours import Rgb, linear
 
 SCHEMA = "AP242DIS"
 

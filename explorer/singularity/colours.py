@@ -1,4 +1,4 @@
-"""Colours of the mechanism: of its bodies, of the proximity to a singularity, of the three margins.
+"""Colours of the proximity to a singularity, and of the three margins.
 
 The scale of proximity is orange below the warning value and blue above it, a pair that is distinct
 in every common colour-vision deficiency. Both ends darken, so that the scale is legible in grey as
@@ -13,25 +13,12 @@ from __future__ import annotations
 
 import itertools
 
-Rgb = tuple[int, int, int]
+from explorer.numerics.rgb import Rgb, mix
 
 SINGULAR: Rgb = (196, 52, 8)
 WARNED: Rgb = (246, 178, 76)
 CLEAR: Rgb = (112, 172, 220)
 FAR: Rgb = (24, 74, 150)
-# Colour of colliding legs and bodies.
-OUTLINE: Rgb = (190, 24, 60)
-
-# Colours of bodies and of the two leaves of the folds, in the scene and in the moving page.
-TUBE: Rgb = (84, 96, 114)
-ROD: Rgb = (188, 197, 209)
-JOINT: Rgb = (52, 60, 72)
-BALL: Rgb = (232, 235, 240)
-BASE_BODY: Rgb = (214, 219, 226)
-PLATFORM_BODY: Rgb = (150, 160, 176)
-RAIL: Rgb = (128, 138, 152)
-CARRIAGE: Rgb = (104, 115, 132)
-LEAVES: tuple[Rgb, Rgb] = ((176, 156, 112), (96, 140, 136))
 
 MARGIN_COLOURS: tuple[Rgb, Rgb, Rgb] = ((180, 0, 240), (255, 75, 150), (90, 135, 90))
 """Colours of lines and marks of δ1, δ2 and δ3, visible on light and dark pages alike."""
@@ -72,27 +59,3 @@ def band_colours() -> tuple[Rgb, ...]:
     """Return the colour of each band of `BAND_EDGES` and of the one beyond."""
     edges = (*BAND_EDGES, 1.5 * BAND_EDGES[-1])
     return tuple(proximity_colour(0.5 * (a + b)) for a, b in itertools.pairwise(edges))
-
-
-def css(colour: Rgb) -> str:
-    """Return the colour as hexadecimal CSS."""
-    return "#{:02x}{:02x}{:02x}".format(*colour)
-
-
-def mix(a: Rgb, b: Rgb, share: float) -> Rgb:
-    """Return the mixture of two colours; a share of 0 is the first, 1 the second."""
-    red, green, blue = (round(x + share * (y - x)) for x, y in zip(a, b, strict=True))
-    return red, green, blue
-
-
-def linear(channel: int) -> float:
-    """Return a channel of sRGB, 0 to 255, as linear light from 0 to 1 (IEC 61966-2-1)."""
-    share = channel / 255.0
-    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
-
-
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Ends of the bands of utilisations of a limit; the last one is the limit."""
-
-SHARE_COLOURS: tuple[Rgb, ...] = (FAR, mix(FAR, CLEAR, 0.5), CLEAR, WARNED, SINGULAR)
-"""Colours of these bands, and of the one beyond the limit."""

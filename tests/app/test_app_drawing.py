@@ -42,8 +42,10 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_fitted
+from explorer.numerics.rgb import Rgb
 from explorer.page.look import read_stylesheet
-from explorer.singularity.colours import FAR_WARNINGS, OUTLINE, Rgb, proximity_colour
+from explorer.prototype.body_colours import OUTLINE
+from explorer.singularity.colours import FAR_WARNINGS, proximity_colour
 
 OPTIMAL = PRESETS["paper-optimal"]
 

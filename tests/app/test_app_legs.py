@@ -56,7 +56,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import OUTLINE, TUBE
+from explorer.prototype.body_colours import OUTLINE, TUBE
 from explorer.workspace.accessible.nodes import InvalidStartError, check_start
 from explorer.workspace.accessible.radii import RadiusCurve
 from explorer.workspace.least_clearance import least_clearances

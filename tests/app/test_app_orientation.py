@@ -34,7 +34,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_from_rotation, tilt_torsion_of
 from explorer.numerics.number_text import UNITS
-from explorer.singularity.colours import css
+from explorer.numerics.rgb import css
 from explorer.workspace.orientations.share import cone_of_directions, orientation_share
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,

@@ -54,8 +54,8 @@ from explorer.mechanism.pose import Pose
 from explorer.motion.chains import LEGS, ON_GUIDE, Places
 from explorer.page.widgets.assigning import Assigner
 from explorer.prototype.assembly import bill_of_materials, make_prototype
+from explorer.prototype.body_colours import OUTLINE
 from explorer.prototype.fitting import broken_joint_limits, buildability
-from explorer.singularity.colours import OUTLINE
 
 OPTIMAL = PRESETS["paper-optimal"]
 PARTS = 18

@@ -24,6 +24,7 @@ from explorer.app.features.singularity.work import STRATA_FEED, GoToSingularity
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
+from explorer.measures.position_bands import position_bands
 from explorer.measures.snapshot import evaluate
 from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict, warnings
 from explorer.mechanism.design import Design
@@ -32,9 +33,9 @@ from explorer.mechanism.kinematics import jacobian_factors
 from explorer.mechanism.margins import describe_modes
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.numerics.number_text import Unit
-from explorer.singularity.colours import SINGULAR, WARN_SHARE, WARNED, css, proximity_colour
+from explorer.numerics.rgb import css
+from explorer.singularity.colours import SINGULAR, WARN_SHARE, WARNED, proximity_colour
 from explorer.singularity.strata import COVERED, OF_INCIDENCES, incidences
-from explorer.workspace.position_bands import position_bands
 from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -35,6 +35,8 @@ from explorer.app.state.moves import SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView
 from explorer.errors import InputError
+from explorer.measures.blocks.block import UTILISATION_EDGES
+from explorer.measures.position_bands import STEP_COLOURS, UTILISATION_COLOURS
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
@@ -48,7 +50,6 @@ from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.workspace.carried_region import carried_region
-from explorer.workspace.position_bands import SHARE_COLOURS, SHARES, STEP_COLOURS
 from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.workspace import Workspace
@@ -407,12 +408,18 @@ def test_surface_lies_in_the_bands_of_the_shares_also_beside_singular_planes(cut
     pose = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-60.0, 20.0, 30.0))
     drawing = drawing_of(replace(load_state(design, colour="share", cut=cut), pose=pose))
     rotation = np.array(drawing.request.rotation)
-    bands = dict(zip(SHARE_COLOURS, itertools.pairwise((0.0, *SHARES, math.inf)), strict=True))
+    bands = dict(
+        zip(
+            UTILISATION_COLOURS,
+            itertools.pairwise((0.0, *UTILISATION_EDGES, math.inf)),
+            strict=True,
+        )
+    )
     assert share_off(drawing, bands, lambda at: shares_at(design, at, rotation), 0.02) < 2e-3
     # Triangles end at the planes that pass through the surface, in the last band.
     crossed = 0
     last = drawing.surface.shells[0]
-    assert last.colour == SHARE_COLOURS[-1]
+    assert last.colour == UTILISATION_COLOURS[-1]
     corners = np.concatenate([shell.vertices for shell in drawing.surface.shells])
     for normal in planes_of_singularity(rotation):
         sides = corners @ normal

@@ -9,14 +9,9 @@ import pytest
 
 from explorer.app.scene.shapes import COMPARED
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import (
-    FAR_WARNINGS,
-    MARGIN_COLOURS,
-    OUTLINE,
-    Rgb,
-    margin_text,
-    proximity_colour,
-)
+from explorer.numerics.rgb import Rgb
+from explorer.prototype.body_colours import OUTLINE
+from explorer.singularity.colours import FAR_WARNINGS, MARGIN_COLOURS, margin_text, proximity_colour
 
 LIGHT, DARK = (255, 255, 255), (36, 36, 36)
 """Background of light panels and of dark ones."""

@@ -10,8 +10,9 @@ import viser
 from explorer.app.scene.shapes import add_label, add_lines, add_translucent, sphere, write_label
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Update
-from explorer.singularity.colours import FAR, Rgb
+from explorer.singularity.colours import FAR
 
 OPACITY = 0.3
 

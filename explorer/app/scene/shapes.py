@@ -18,8 +18,8 @@ from scipy.spatial import ConvexHull
 
 from explorer.app.widgets.charts import NEUTRAL
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.rgb import Rgb, linear
 from explorer.page.widgets.assigning import Update
-from explorer.singularity.colours import Rgb, linear
 
 # Colours of the scene, besides those of `explorer.singularity.colours`.
 GHOST: Rgb = NEUTRAL

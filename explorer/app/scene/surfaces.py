@@ -22,15 +22,17 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from explorer.measures.position_bands import PositionBands, PositionMeasure, position_bands
 from explorer.mechanism.machine import NO_LOAD, Six
 from explorer.mechanism.margins import planes_of_singularity
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
+from explorer.numerics.rgb import Rgb, mix
 from explorer.numerics.roots import find_roots
-from explorer.singularity.colours import OUTLINE, SINGULAR, WARNED, Rgb, mix
+from explorer.prototype.body_colours import OUTLINE
+from explorer.singularity.colours import SINGULAR, WARNED
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.workspace import PAIR_NAMES
 from explorer.workspace.faces.faces import Faces, divide
-from explorer.workspace.position_bands import PositionBands, PositionMeasure, position_bands
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.workspace import Workspace
 

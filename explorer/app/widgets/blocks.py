@@ -9,8 +9,10 @@ from html import escape
 from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, TEAL, VIOLET
 from explorer.app.widgets.markup import box, caption, dim, meter, row, swatch, table
 from explorer.measures.blocks import block as kinds
+from explorer.measures.blocks.block import UTILISATION_EDGES
+from explorer.measures.position_bands import UTILISATION_COLOURS
 from explorer.numerics.number_text import format_decimals
-from explorer.singularity.colours import SHARE_COLOURS, SHARES, Rgb, css
+from explorer.numerics.rgb import Rgb, css
 
 KIND_COLOURS: dict[kinds.Kind, Rgb] = {"actuator": BLUE, "dimension": ORANGE}
 # Between the components of a vector, which stay on one line.
@@ -76,7 +78,7 @@ def share_colour(share: float | None) -> Rgb:
     """Return the colour of a share of a limit; grey without a limit."""
     if share is None:
         return NEUTRAL
-    return SHARE_COLOURS[bisect.bisect_left(SHARES, share)]
+    return UTILISATION_COLOURS[bisect.bisect_left(UTILISATION_EDGES, share)]
 
 
 def _statement(block: kinds.Statement, acts: Mapping[str, str]) -> Iterator[str]:

@@ -7,7 +7,8 @@ from html import escape
 from typing import Literal
 
 from explorer.measures.blocks.block import Look
-from explorer.singularity.colours import MARGIN_COLOURS, Rgb, css, margin_text
+from explorer.numerics.rgb import Rgb, css
+from explorer.singularity.colours import MARGIN_COLOURS, margin_text
 
 
 def by_theme(light: str, dark: str) -> str:

@@ -12,6 +12,7 @@ import viser
 
 from explorer.app.session.session import Who
 from explorer.app.widgets.buttons import Buttons
+from explorer.numerics.rgb import Rgb
 from explorer.page.browser.viser_gaps import (
     SceneMessage,
     assign_in,
@@ -20,7 +21,6 @@ from explorer.page.browser.viser_gaps import (
     run_script_in,
 )
 from explorer.page.look import call_script, read_script
-from explorer.singularity.colours import Rgb
 
 # Colours of buttons and of the tab in front; the second is light enough for dark panels.
 BRAND: Rgb = (24, 74, 150)

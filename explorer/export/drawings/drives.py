@@ -14,8 +14,8 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import or_infinite
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.numerics.rgb import Rgb, css
 from explorer.paths.drives import PARTS, PathDrives
-from explorer.singularity.colours import Rgb, css
 
 # The width of the charts, the height of one over time and of that of forces and speeds, and the
 # room around each.

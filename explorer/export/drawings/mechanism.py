@@ -31,7 +31,8 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import MARGIN_COLOURS, css, proximity_colour
+from explorer.numerics.rgb import css
+from explorer.singularity.colours import MARGIN_COLOURS, proximity_colour
 
 ViewName = Literal["isometric", "front", "side", "top"]
 Frame: TypeAlias = tuple[float, float, float, float]

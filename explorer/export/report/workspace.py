@@ -21,6 +21,7 @@ from explorer.export.tables import corners_csv
 from explorer.measures.blocks import forces, precision as blocks
 from explorer.measures.blocks.block import Block
 from explorer.measures.catalogue import CATALOGUE
+from explorer.measures.position_bands import position_bands
 from explorer.mechanism.machine import Tool
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -30,7 +31,6 @@ from explorer.singularity.colours import WARN_SHARE
 from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.workspace.carried_region import CarriedRegion
 from explorer.workspace.limits.table import bounds_angles
-from explorer.workspace.position_bands import position_bands
 from explorer.workspace.slices.volume import COLUMNS
 from explorer.workspace.solids.solid import Solid, convex_hull
 

@@ -22,7 +22,6 @@ from explorer.numerics.number_text import (
     format_fitted,
     format_number,
 )
-from explorer.singularity.colours import SHARES
 
 Look = Literal["within", "close", "beyond"]
 """Whether a value keeps its bounds, is close to them, or beyond."""
@@ -30,7 +29,10 @@ Look = Literal["within", "close", "beyond"]
 Kind = Literal["actuator", "dimension"]
 """What a bar stands for, which the page shows in its colour."""
 
-CLOSE = SHARES[-2]
+UTILISATION_EDGES = (0.25, 0.5, 0.75, 1.0)
+"""Ends of the bands of utilisation of a limit; the last one is the limit."""
+
+CLOSE = UTILISATION_EDGES[-2]
 """Utilisation of a limit from which a load is close to it."""
 # Largest share that is told as a number, and distance from the limit up to which with a decimal.
 MOST_SHARE, NEAR = 1e4, 0.005

@@ -18,7 +18,7 @@ from explorer.measures.catalogue import CATALOGUE, Measure, Measurements, measur
 from explorer.mechanism.design import Design
 from explorer.numerics import number_text
 from explorer.numerics.number_text import Unit
-from explorer.singularity.colours import Rgb
+from explorer.numerics.rgb import Rgb
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9

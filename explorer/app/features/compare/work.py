@@ -27,7 +27,7 @@ from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import Rgb
+from explorer.numerics.rgb import Rgb
 from explorer.workspace.solids.solids import whole_solid
 
 LIVE, NAMES = 0, ("live", *SLOTS)

@@ -24,8 +24,8 @@ from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_number
+from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
-from explorer.singularity.colours import Rgb
 from explorer.statics.loaded import LoadedPose
 
 LOAD: Rgb = (150, 40, 160)

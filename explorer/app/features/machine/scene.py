@@ -11,8 +11,8 @@ from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
-from explorer.singularity.colours import Rgb
 
 # Length and radius of the axes of the tool, in scene units, and thickness of its line in pixels.
 AXIS_LENGTH, AXIS_RADIUS, THICKNESS = 0.9, 0.035, 2.5

@@ -22,10 +22,12 @@ from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
 from explorer.legs.clearance import legs_of
 from explorer.measures.snapshot import Snapshot
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
+from explorer.prototype import body_colours
+from explorer.prototype.body_colours import OUTLINE
 from explorer.reproduce.six_legs import TWIN
-from explorer.singularity import colours
-from explorer.singularity.colours import OUTLINE, Rgb, proximity_colour
+from explorer.singularity.colours import proximity_colour
 
 # Sizes in scene units.
 PLATE_THICKNESS, BASE_RADIUS = 0.22, 0.75
@@ -61,9 +63,11 @@ class Bodies(ScenePart):
         scene = services.scene
         # Whatever is rigid with the platform has this frame as its parent.
         self._frame = scene.add_frame("/platform", show_axes=False)
-        self._base = scene.add_mesh_simple("/base/body", *shapes.NO_MESH, color=colours.BASE_BODY)
+        self._base = scene.add_mesh_simple(
+            "/base/body", *shapes.NO_MESH, color=body_colours.BASE_BODY
+        )
         self._platform = scene.add_mesh_simple(
-            "/platform/body", *shapes.NO_MESH, color=colours.PLATFORM_BODY, side="double"
+            "/platform/body", *shapes.NO_MESH, color=body_colours.PLATFORM_BODY, side="double"
         )
 
     def updates(self, placed: Placed) -> Updates:
@@ -143,21 +147,21 @@ class Telescopes(shapes.Rods):
 
 
 def _colours_of_parts(alarms: list[bool]) -> list[Rgb]:
-    tubes = [OUTLINE if alarm else colours.TUBE for alarm in alarms]
-    rods = [OUTLINE if alarm else colours.ROD for alarm in alarms]
-    return [*tubes, *rods, *[colours.JOINT] * (2 * len(alarms))]
+    tubes = [OUTLINE if alarm else body_colours.TUBE for alarm in alarms]
+    rods = [OUTLINE if alarm else body_colours.ROD for alarm in alarms]
+    return [*tubes, *rods, *[body_colours.JOINT] * (2 * len(alarms))]
 
 
 class Legs(ScenePart):
     """The four legs with their joints, carriages and guide."""
 
     def __init__(self, services: Services) -> None:
-        scene, joint, rod = services.scene, colours.JOINT, colours.ROD
+        scene, joint, rod = services.scene, body_colours.JOINT, body_colours.ROD
         self._actuators = Telescopes(scene, "/legs/actuators", 4)
         # A post and two pins for each U joint, and a sleeve about the guide for each carriage.
         self._joints = shapes.Rods(scene, "/legs/joints", [joint, rod, rod] * 2 + [joint] * 2)
-        self._balls = shapes.Balls(scene, "/legs/balls", [colours.BALL] * 4 + [joint] * 2)
-        boxes = [colours.RAIL, colours.CARRIAGE, colours.CARRIAGE]
+        self._balls = shapes.Balls(scene, "/legs/balls", [body_colours.BALL] * 4 + [joint] * 2)
+        boxes = [body_colours.RAIL, body_colours.CARRIAGE, body_colours.CARRIAGE]
         self._guide = shapes.Boxes(scene, "/legs/guide", boxes)
 
     def updates(self, placed: Placed) -> Updates:
@@ -204,9 +208,9 @@ class TwinLegs(ScenePart):
     """The six legs of the 6-4 twin, which start at a1 and a2 instead of the carriages."""
 
     def __init__(self, services: Services) -> None:
-        scene, joints = services.scene, [colours.JOINT] * 3
+        scene, joints = services.scene, [body_colours.JOINT] * 3
         self._actuators = Telescopes(scene, "/twin/actuators", len(TWIN))
-        self._balls = shapes.Balls(scene, "/twin/balls", joints + [colours.BALL] * 4)
+        self._balls = shapes.Balls(scene, "/twin/balls", joints + [body_colours.BALL] * 4)
         self._posts = shapes.Rods(scene, "/twin/posts", joints)
 
     def updates(self, placed: Placed) -> Updates:

@@ -34,15 +34,10 @@ from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.margins import signs_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals
+from explorer.numerics.rgb import Rgb, css
 from explorer.page.widgets.assigning import Updates
-from explorer.singularity.colours import (
-    FAR_WARNINGS,
-    LEAVES,
-    MARGIN_COLOURS,
-    Rgb,
-    css,
-    proximity_colour,
-)
+from explorer.prototype.body_colours import LEAVES
+from explorer.singularity.colours import FAR_WARNINGS, MARGIN_COLOURS, proximity_colour
 
 HINTS = (
     "The distance of a1 and b4. All three margins grow with it.",

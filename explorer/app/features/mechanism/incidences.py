@@ -24,9 +24,10 @@ from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_fitted
+from explorer.numerics.rgb import Rgb, mix
 from explorer.page.widgets.assigning import Updates
+from explorer.prototype import body_colours
 from explorer.singularity import colours
-from explorer.singularity.colours import Rgb
 from explorer.singularity.ellipsoids import planes_of_singularity
 
 HOVER = "margins.hover"
@@ -200,7 +201,7 @@ class Tetrahedra(ScenePart):
             centre = corners.mean(axis=0)
             inner = corners + INSET * (centre - corners)
             colour, share = colours.MARGIN_COLOURS[index], 0.0 if approach.is_nearest else PALE
-            tone = colours.mix(colour, GREY, share)
+            tone = mix(colour, GREY, share)
             yield from self._draw_edges(index, inner, approach, tone, fails=index in failing)
             is_named = approach.is_shown and not approach.has_label and state.view.labels
             yield self._names[index], "visible", is_named
@@ -220,7 +221,7 @@ class Tetrahedra(ScenePart):
         segments = shapes.dashes(corners[EDGES], stroke.most, stroke.period, stroke.drawn)
         yield edges, "visible", approach.is_shown or fails
         yield edges, "points", segments.astype(np.float32)
-        drawn = colours.OUTLINE if fails else colour
+        drawn = body_colours.OUTLINE if fails else colour
         yield edges, "colors", shapes.of_one_colour(drawn, len(segments))
         thickness = stroke.thickness * (1.0 if approach.is_nearest else QUIET)
         thickness += FILLED_EDGE * approach.presence * approach.is_nearest

@@ -31,11 +31,11 @@ from explorer.measures.box import corners_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import Unit, format_decimals
+from explorer.numerics.rgb import Rgb
 from explorer.page.browser.browser_facts import decode_text
 from explorer.page.browser.viser_gaps import run_script
 from explorer.page.look import read_script
 from explorer.page.widgets.assigning import Updates
-from explorer.singularity.colours import Rgb
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,
     greatest_tilt,

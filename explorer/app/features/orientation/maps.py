@@ -18,7 +18,8 @@ from explorer.app.widgets.markup import caption, dim, reading, row, swatch, tabl
 from explorer.export.drawings.markup import circle, drawing_text, element, page_picture, path_of
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import MARGIN_COLOURS, Rgb, css
+from explorer.numerics.rgb import Rgb, css
+from explorer.singularity.colours import MARGIN_COLOURS
 from explorer.workspace.orientations.tilts import GreatestTilt, TiltByTorsion, TiltMap
 
 WIDTH, HEIGHT = 316.0, 268.0

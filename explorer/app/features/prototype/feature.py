@@ -27,19 +27,11 @@ from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.motion.chains import BODIES, LEGS, Places
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
+from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
 from explorer.prototype.assembly import exploded_offsets
+from explorer.prototype.body_colours import BALL, CARRIAGE, OUTLINE, PLATFORM_BODY, RAIL, ROD, TUBE
 from explorer.prototype.fitting import broken_joint_limits
-from explorer.singularity.colours import (
-    BALL,
-    CARRIAGE,
-    OUTLINE,
-    PLATFORM_BODY,
-    RAIL,
-    ROD,
-    TUBE,
-    Rgb,
-)
 
 # Format of each file by its name on the page, and end of the name of the file.
 ASSEMBLIES = {

@@ -26,9 +26,9 @@ from explorer.app.state.state import State
 from explorer.errors import InputError, NoAnswerError
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_apart, format_decimals, format_number
+from explorer.numerics.rgb import Rgb
 from explorer.page.browser.viser_gaps import SceneMessage, scene_as_html
 from explorer.page.look import read_script
-from explorer.singularity.colours import Rgb
 
 # Messages outside the tree of the scene that go into the file.
 KEPT = (

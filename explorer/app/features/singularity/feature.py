@@ -32,6 +32,7 @@ from explorer.measures.verdict import DISTANCE_SHARE, warnings
 from explorer.mechanism.folds import FOLD_LINES, FOLDS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
 from explorer.numerics.number_text import format_decimals, format_fitted
+from explorer.numerics.rgb import css
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import shift
 from explorer.singularity import colours, strata
@@ -115,7 +116,7 @@ def measures_table(frame: Frame) -> str:
     """Return the scale of colours and the conditioning as HTML."""
     edge = 100.0 / colours.FAR_WARNINGS
     ends = (colours.SINGULAR, 0), (colours.WARNED, edge), (colours.CLEAR, edge), (colours.FAR, 100)
-    stops = ",".join(f"{colours.css(colour)} {place:g}%" for colour, place in ends)
+    stops = ",".join(f"{css(colour)} {place:g}%" for colour, place in ends)
     state = frame.state
     hint = blocks.colour_words(warnings(state.design.reach, state.warn_below), state.unit)
     most = f"≥ {colours.FAR_WARNINGS:g} times"
@@ -195,7 +196,7 @@ def fold_dial(frame: Frame, index: int) -> str:
         viewBox=f"-20 {top:g} 40 {NEEDLE + 6.0:g}",
         aria_hidden="true",
     )
-    needle, ends = colours.css(colours.MARGIN_COLOURS[index]), colours.css(colours.SINGULAR)
+    needle, ends = css(colours.MARGIN_COLOURS[index]), css(colours.SINGULAR)
     style = f"--colour:{needle};--end:{ends}"
     return as_html(element("span", drawing, angle, class_="ex-dial", title=hint, style=style))
 
@@ -325,7 +326,7 @@ def _node(stratum: Stratum, below: str, level: float | None, *, is_here: bool) -
         level = float("inf")
     if is_here or is_generic:
         below = "here" if is_here else "any"
-    colour = "currentColor" if level is None else colours.css(colours.proximity_colour(level))
+    colour = "currentColor" if level is None else css(colours.proximity_colour(level))
     place = f"--left:{left:.4g}%;--top:{_top(strata.inversions(stratum))}px;--colour:{colour}"
     digits = "".join(map(str, stratum))
     content = f"<b>{digits}</b><span>{below}</span>"

@@ -20,9 +20,10 @@ from explorer.measures.blocks.block import Number
 from explorer.measures.blocks.singularity import finite_gain
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.pose import Pose
+from explorer.numerics.rgb import Rgb
 from explorer.page.session.clock import Timer, now
 from explorer.page.widgets.assigning import Updates
-from explorer.singularity.colours import FAR, SINGULAR, Rgb, proximity_colour
+from explorer.singularity.colours import FAR, SINGULAR, proximity_colour
 from explorer.singularity.freedoms import FreeTurn
 from explorer.singularity.nearest import NearestSingularity
 

@@ -22,10 +22,10 @@ from explorer.app.widgets.chips import Chips, StateCommand
 from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key, shift, with_keys
 from explorer.reproduce.six_legs import TWIN
-from explorer.singularity.colours import Rgb
 
 FORMS: Mapping[DrawnAs, tuple[str, tuple[Key, ...]]] = {
     "schematic": ("Legs and plates as simple bodies.", ()),

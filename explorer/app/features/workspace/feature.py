@@ -28,6 +28,7 @@ from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chips, StateCommand, turn
 from explorer.app.widgets.markup import alert, box, note, sentence
 from explorer.app.widgets.under_way import UnderWay, look_of
+from explorer.measures.position_bands import LOAD_MEASURES, MEASURE_WORDS
 from explorer.measures.verdict import warnings
 from explorer.mechanism.margins import MARGIN_KINDS
 from explorer.mechanism.pose import Pose, Triple
@@ -36,7 +37,6 @@ from explorer.page.browser.viser_gaps import run_script, run_script_in
 from explorer.page.look import call_script, read_script
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key, shift
-from explorer.workspace.position_bands import LOAD_MEASURES, MEASURE_WORDS
 
 SHOWN = {
     "solid": ("Solid", "Draw the positions within all limits at one orientation.", Key("V")),

@@ -17,11 +17,11 @@ from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.measures.position_bands import LOAD_MEASURES, is_unstated
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import NO_LOAD
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import triple
-from explorer.workspace.position_bands import LOAD_MEASURES, is_unstated
 
 if TYPE_CHECKING:
     from explorer.app.features.feature import Services

@@ -15,13 +15,15 @@ from explorer.app.scene.shapes import NO_MESH, Patch, add_label, add_lines, add_
 from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Drawn, Shell
 from explorer.app.state.frame import Frame
 from explorer.measures.box import corners_of
+from explorer.measures.position_bands import STEP_COLOURS, UTILISATION_COLOURS
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
-from explorer.singularity.colours import OUTLINE, Rgb, band_colours, proximity_colour
+from explorer.prototype.body_colours import OUTLINE
+from explorer.singularity.colours import band_colours, proximity_colour
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.faces.surfaces import Surfaces
 from explorer.workspace.limits import constraints as limits
-from explorer.workspace.position_bands import SHARE_COLOURS, STEP_COLOURS
 from explorer.workspace.workspace import Workspace
 
 # Each ray passes at least two faces: the mechanism stays readable within the solid.
@@ -49,7 +51,7 @@ class WorkspaceScene(ScenePart):
         scene = services.scene
         self._feed = services.get(feeds.WORKSPACE_FEED)
         # Collisions are added first and so drawn first: surfaces before them let them through.
-        colours = (COLLIDING, AT_LIMIT, PLAIN, *band_colours(), *SHARE_COLOURS, *STEP_COLOURS)
+        colours = (COLLIDING, AT_LIMIT, PLAIN, *band_colours(), *UTILISATION_COLOURS, *STEP_COLOURS)
         self._colours: tuple[Rgb, ...] = tuple(dict.fromkeys(colours))
         self._shells = [
             add_translucent(scene, f"/workspace/shell/{i}", NO_MESH, PLAIN_OPACITY, colour=colour)

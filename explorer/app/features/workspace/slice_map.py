@@ -19,12 +19,12 @@ from explorer.app.scene.surfaces import Colouring
 from explorer.app.widgets.markup import reading
 from explorer.export.drawings.markup import as_html, coordinate, element
 from explorer.export.drawings.slices import Slices, cross, in_plane, map_transform, ruler
+from explorer.measures.position_bands import MEASURE_WORDS, measure_positions
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import Unit, decimals_for, format_decimals, format_number
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.carried_region import part_names
-from explorer.workspace.position_bands import MEASURE_WORDS, measure_positions
 from explorer.workspace.solids.solid import Solid
 
 Axis = Literal["x", "y", "z"]

@@ -16,20 +16,20 @@ from explorer.app.widgets.blocks import content_of
 from explorer.app.widgets.buttons import MANUAL, press_button
 from explorer.app.widgets.under_way import problem, progress
 from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
-from explorer.measures.blocks.block import Fact, Facts
+from explorer.measures.blocks.block import UTILISATION_EDGES, Fact, Facts
 from explorer.measures.blocks.clearances import workspace_clearances
+from explorer.measures.position_bands import (
+    MEASURE_WORDS,
+    STEP_COLOURS,
+    UTILISATION_COLOURS,
+    PositionMeasure,
+)
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import Unit, format_number
-from explorer.singularity.colours import BAND_EDGES, band_colours, css
+from explorer.numerics.rgb import css
+from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.statics.reactions import has_limits
-from explorer.workspace.position_bands import (
-    MEASURE_WORDS,
-    SHARE_COLOURS,
-    SHARES,
-    STEP_COLOURS,
-    PositionMeasure,
-)
 
 CLAIM = "claims.md#The designs of Table 1 have the printed extents and a volume of 7992."
 """The place in the manual that explains the paper's volume of its optimum."""
@@ -205,8 +205,8 @@ def legend(
     if measure in MEASURE_WORDS:
         words, symbol, factor = MEASURE_WORDS[measure]
         name = f"{words.capitalize()} ({symbol})"
-        colours = SHARE_COLOURS if measure == "share" else STEP_COLOURS
-        levels: tuple[float, ...] = SHARES if measure == "share" else ()
+        colours = UTILISATION_COLOURS if measure == "share" else STEP_COLOURS
+        levels: tuple[float, ...] = UTILISATION_EDGES if measure == "share" else ()
         if measure != "share" and drawing is not None and drawing.request.colour == measure:
             levels = drawing.levels[:0:-1]
         texts = ("0", *(format_number(factor * level, 3) for level in levels), "∞")

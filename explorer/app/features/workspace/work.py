@@ -16,6 +16,7 @@ from explorer.app.scene.surfaces import PLAIN, Colouring, Measure, Shell, crease
 from explorer.app.session.feed import watch_of
 from explorer.errors import ExplorerError, InputError
 from explorer.jobs.process import Channel
+from explorer.measures.position_bands import PositionMeasure
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import NO_LOAD, Six
 from explorer.mechanism.pose import Triple
@@ -30,7 +31,6 @@ from explorer.workspace.carried_region import carried_region
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.faces.faces import Faces, faces_within, workspace_faces
 from explorer.workspace.limits.constraints import HalfSpace
-from explorer.workspace.position_bands import PositionMeasure
 from explorer.workspace.slices.volume import NodeCount, Volume, node_count_of, volume_of
 from explorer.workspace.solids.solid import Solid, convex_hull, cut_solid
 from explorer.workspace.solids.solids import whole_solid
@@ -211,7 +211,7 @@ class WorkspaceDrawing:
         extent: (lows, highs) of the solid; None if it is empty.
         nodes: The paper's node count within the limits; None if the grid is too fine.
         levels: The measure that colours the map at the edge of each band, see
-            `explorer.workspace.position_bands.PositionBands`.
+            `explorer.measures.position_bands.PositionBands`.
     """
 
     request: WorkspaceRequest

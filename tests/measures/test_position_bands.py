@@ -10,6 +10,15 @@ import pytest
 from machines import FULL, six
 
 from explorer import PRESETS, Actuators, Design, Payload, Struts, Tool, inverse, reactions
+from explorer.measures.blocks.block import UTILISATION_EDGES
+from explorer.measures.position_bands import (
+    LOAD_MEASURES,
+    MEASURE_WORDS,
+    STEPS,
+    PositionMeasure,
+    is_unstated,
+    position_bands,
+)
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.margins import planes_of_singularity
@@ -17,15 +26,6 @@ from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.reactions import limit_shares
-from explorer.workspace.position_bands import (
-    LOAD_MEASURES,
-    MEASURE_WORDS,
-    SHARES,
-    STEPS,
-    PositionMeasure,
-    is_unstated,
-    position_bands,
-)
 from explorer.workspace.workspace import Workspace
 
 MEASURES: tuple[PositionMeasure, ...] = tuple(MEASURE_WORDS)
@@ -207,7 +207,7 @@ def test_levels_of_forces_are_round_numbers_that_suit_the_load(factor: float) ->
     shares = position_bands(
         Workspace(LOADED, rotation), "share", warn_below=1.0, load=tuple((factor * LOAD).tolist())
     )
-    assert shares.levels[:0:-1] == SHARES
+    assert shares.levels[:0:-1] == UTILISATION_EDGES
     assert np.isinf(bands.levels[0])
     levels = bands.levels[:0:-1]
     assert len(bands.colours) == len(bands.edges) == len(levels) + 1

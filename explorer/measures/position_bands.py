@@ -15,23 +15,16 @@ from typing import Literal
 
 import numpy as np
 
+from explorer.measures.blocks.block import UTILISATION_EDGES
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import NO_LOAD
 from explorer.motion.weights import payload_wrench
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.computed_once import computed_once
+from explorer.numerics.rgb import Rgb, mix
 from explorer.singularity import colours
-from explorer.singularity.colours import (
-    CLEAR,
-    FAR,
-    SHARE_COLOURS,
-    SHARES,
-    SINGULAR,
-    WARNED,
-    Rgb,
-    mix,
-)
+from explorer.singularity.colours import CLEAR, FAR, SINGULAR, WARNED
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, deflection, is_elastic, stiffness_of
 from explorer.statics.load_cases import largest_shares, load_case
@@ -57,6 +50,8 @@ STEPS = (1, 2, 5)
 """Ends of the bands of forces, moments and displacements, over powers of ten."""
 # Number of these ends. The lowest exceeds this share of the values within the limits.
 LEVELS, LEAST_SHARE = 6, 0.05
+UTILISATION_COLOURS: tuple[Rgb, ...] = (FAR, mix(FAR, CLEAR, 0.5), CLEAR, WARNED, SINGULAR)
+"""Colours of the bands of `UTILISATION_EDGES`, and of the one beyond the limit."""
 STEP_COLOURS: tuple[Rgb, ...] = (
     *(mix(FAR, CLEAR, share) for share in (0.0, 1 / 3, 2 / 3, 1.0)),
     *(mix(WARNED, SINGULAR, share) for share in (0.0, 0.5, 1.0)),
@@ -118,7 +113,7 @@ def position_bands(
         own = colours.band_colours()
         return PositionBands(measure, edges, own, levels, lambda points: measure_at(points) / unit)
     if measure == "share":
-        levels, own = SHARES, SHARE_COLOURS
+        levels, own = UTILISATION_EDGES, UTILISATION_COLOURS
     else:
         levels, own = _round_levels(workspace, measure_at), STEP_COLOURS
     highest = levels[-1]
