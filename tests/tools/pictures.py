@@ -31,7 +31,6 @@ from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign
-from explorer.app.features.studies.feature import StudiesPanel
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.studies.state import Brush, within
 from explorer.app.scene.camera import ViewName
@@ -335,13 +334,14 @@ def draw_studies(browser: Browser) -> bytes:
         index = int(results.columns["index"][row])
         running = start(DESIGN, port=0, studies=StudyFolders(Path(home)))
         try:
-            session, panel = running.page.session, running.page.services.get(StudiesPanel)
+            session, jobs = running.page.session, running.page.services.jobs
             session.do(bare())
             session.do(OpenStudy(study.name))
             session.do(PickDesign(results.design_of_row(row), index=index, study=study.name))
             session.do(BrushAxes(brushes))
             session.wait_until_idle()
-            assert panel.feed.wait_until_idle(60.0)
+            assert jobs.wait_until_idle(60.0)
+            session.wait_until_idle()
             page, client = open_page(browser, running, (1280, 1000))
             page.get_by_role("tab", name="Studies", exact=True).click()
             page.locator("[data-plot]").nth(1).wait_for()
