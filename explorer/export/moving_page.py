@@ -53,7 +53,7 @@ def moving_page(design: Design) -> bytes:
 
 
 def page_data(design: Design) -> dict[str, Any]:
-    """Return what the page's scripts take of a design, as values of JSON."""
+    """Return the data of a design for the page's scripts, as values of JSON."""
     unit, home, possible = design.unit_mm, design.home_pose, possible_ranges(design)
     ranges, axes, words = limit_rows(design)
     radii, pair_words = pair_rows(design)

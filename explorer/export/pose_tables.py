@@ -44,7 +44,7 @@ from explorer.workspace.limits.valid_poses import COLLISIONS, colliding_pairs, s
 MOST_LINES = 100_000
 """Largest number of poses or joints in a table."""
 NO_POSE = "the lengths do not close"
-"""What is wrong with joints that have no pose."""
+"""The message on joints that have no pose."""
 
 POSITION, TOOL = ("x", "y", "z"), ("tool_x", "tool_y", "tool_z")
 QUATERNION = ("qw", "qx", "qy", "qz")

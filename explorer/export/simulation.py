@@ -139,7 +139,7 @@ class SimulationModel:
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """What the design has that the model has not, in words."""
+        """The properties of the design that the model lacks, in words."""
         limits, design = self.design.limits, self.design
         is_imprecise = bool(source_errors(design).any()) or is_elastic(design)
         words = {

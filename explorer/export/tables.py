@@ -30,7 +30,7 @@ def trajectory_csv(trajectory: Trajectory, unit_mm: float | None = None) -> str:
 
 
 def drives_csv(drives: PathDrives, trajectory: Trajectory) -> str:
-    """Return what a path asks of the actuators as CSV: a header, then a line per sample.
+    """Return the actuators' motion and forces along a path as CSV: a header, a line per sample.
 
     The trajectory is that of the same path and time law; lengths are in mm.
     """

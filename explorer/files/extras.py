@@ -31,7 +31,7 @@ def install_command(extra: str) -> str:
 
 
 def need_of(extra: str) -> str:
-    """Return what needs an extra, and how to install it, as the end of a sentence."""
+    """Return the features that need an extra, and how to install it, as the end of a sentence."""
     how = install_command(extra) or "it has packages for Linux alone"
     return f"{EXTRAS[extra][0]} need the extra {extra}: {how}"
 

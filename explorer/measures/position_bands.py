@@ -50,6 +50,7 @@ STEPS = (1, 2, 5)
 """Ends of the bands of forces, moments and displacements, over powers of ten."""
 # Number of these ends. The lowest exceeds this share of the values within the limits.
 LEVELS, LEAST_SHARE = 6, 0.05
+
 UTILISATION_COLOURS: tuple[Rgb, ...] = (FAR, mix(FAR, CLEAR, 0.5), CLEAR, WARNED, SINGULAR)
 """Colours of the bands of `UTILISATION_EDGES`, and of the one beyond the limit."""
 STEP_COLOURS: tuple[Rgb, ...] = (

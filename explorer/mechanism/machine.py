@@ -65,7 +65,7 @@ class Tool(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the platform carries: a mass, and a force of any direction at the tool point.
+    """The load that the platform carries: a mass, and a force of any direction at the tool point.
 
     Attributes:
         mass_kg: Mass, in kilograms.

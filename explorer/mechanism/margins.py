@@ -31,7 +31,7 @@ TETRAHEDRA = (("b1", "b2", "b3", "a1"), ("a1", "a2", "b2", "b3"), ("b4", "a1", "
 """The tetrahedra of the three trilaterations, in the order δ1, δ2, δ3."""
 
 MARGIN_KINDS = "δ1 and δ3 are distances, δ2 is a distance times a sine"
-"""What the margins are, for texts that compare them with one another."""
+"""The meaning of the margins, for texts that compare them with one another."""
 
 INCIDENT = 1e-9
 """Tolerance of an incidence, by which a pose has its stratum: a share of the reach, or radians."""

@@ -37,7 +37,7 @@ _NOT_A_SEQUENCE = (str, bytes, bytearray, Set, Mapping)
 
 
 def size_problem(value: float, least: float = 0.0, most: float = MOST) -> str:
-    """Return what is wrong with the size of a number, to follow its name; "" if nothing is.
+    """Return the fault in the size of a number, to follow its name; "" if nothing is.
 
     It must be finite, at most the largest size and, unless it is zero, at least the least one.
     """

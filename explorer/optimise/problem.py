@@ -54,7 +54,7 @@ lengths, and the shift of the required box along each axis."""
 
 SWING_LIMIT, MAXIMA = "swing", "maximum lengths"
 NO_LOAD, NO_ERRORS, RIGID = "no load", "no errors", "rigid"
-"""What keeps a problem from a start: bounds of the swing, fixed maxima, or what it lacks."""
+"""The obstacles to a start: bounds of the swing, fixed maxima, or what it lacks."""
 
 # Least value of the reach as a variable, as a share of the start's.
 LEAST_REACH = 1e-3

@@ -1,1 +1,1 @@
-"""What a page in viser is made of, whatever mechanism it shows."""
+"""The parts of a page in viser, whatever mechanism it shows."""

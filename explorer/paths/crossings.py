@@ -58,7 +58,7 @@ class Crossing:
 
 @dataclass(frozen=True)
 class PathMargins:
-    """What the margins do over a path.
+    """The course of the margins over a path.
 
     Attributes:
         poses: Corners of the path.

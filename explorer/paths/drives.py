@@ -109,7 +109,7 @@ class ActuatorMotion:
 
     @staticmethod
     def of(design: Design, law: TimeLaw, motion: Motion, bodies: MovingBodies) -> ActuatorMotion:
-        """Return what a motion with a law asks of the actuators, given the masses that move.
+        """Return speeds, forces and powers of the actuators along timed moves, given the masses.
 
         Raises:
             NoAnswerError: The path is singular.
@@ -151,7 +151,7 @@ class PathDrives(ActuatorMotion):
 
     @staticmethod
     def along(design: Design, law: TimeLaw, bodies: MovingBodies) -> PathDrives:
-        """Return what a time law asks of the actuators; arguments and errors as in `of`."""
+        """Return the actuators' motion under a time law; arguments and errors as in `of`."""
         # One part after the other, because a path of many moves has a million intervals.
         found = [
             ActuatorMotion.of(design, law, law.within_intervals([part]), bodies) for part in PARTS
@@ -213,7 +213,7 @@ class PathDrives(ActuatorMotion):
 
 
 def drives_along(design: Design, path: TimedPath) -> PathDrives:
-    """Return what a path within the limits of a design asks of its actuators.
+    """Return speeds, forces and powers of the actuators along a path within a design's limits.
 
     Raises:
         InputError: The path leaves the limits or has no length, the platform has no mass, or
@@ -262,7 +262,7 @@ def check_limits(design: Design, moves: StraightMoves) -> None:
 
 
 def drive_blocks(drives: PathDrives) -> Iterator[block.Block]:
-    """Yield what a path asks of the actuators, and of one motor for all six."""
+    """Yield the demands of a path on the actuators, and on one motor for all six."""
     units = (" mm/s,", " N peak force,", " N continuous force (RMS) and", " W peak power.")
     speed, force, steady, power = map(block.Number, [*drives.least_motor.values()][:4], units)
     used = [*map(_binding_words, drives.binding)]

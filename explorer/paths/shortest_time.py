@@ -37,7 +37,7 @@ UNBOUNDED = 1e4
 
 
 class RateBounds(NamedTuple):
-    """What the limits of the actuators demand at places of a path: a u + b x ≤ most, x ≤ square.
+    """The demands of the actuators' limits at places of a path: a u + b x ≤ most, x ≤ square.
 
     Attributes:
         a, b, most: Bounds of accelerations and forces to either side, shape (n, 24) each.

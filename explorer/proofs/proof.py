@@ -10,7 +10,7 @@ from explorer.numerics.cells import CellValues
 
 
 class Proof(NamedTuple):
-    """What is known of one demand over a whole set of poses.
+    """The verdict on one demand over a whole set of poses.
 
     Amounts are dimensionless: above zero where the demand is missed, below where it has to spare.
 

@@ -196,7 +196,7 @@ def _sizes(design: Design, unit: float = 1.0, open_share: float = 0.0) -> Sizes:
 
 
 def _problems(sizes: Sizes) -> Iterator[str]:
-    """Yield what prevents parts of these sizes from being assembled in the home pose."""
+    """Yield the obstacles to assembling parts of these sizes in the home pose."""
     if sizes.worst is not None:
         parts, *lengths = sizes.worst
         distance, needed = format_apart(lengths, 3)

@@ -172,7 +172,7 @@ class ImperfectMachine:
         return self.pose(inverse(self.design, home.position, home.rotation), home)
 
     def remarks(self) -> list[str]:
-        """Return what differs from the perfect machine, as lines of text."""
+        """Return the differences from the perfect machine, as lines of text."""
         seed = "" if self.seed is None else f", drawn with seed {self.seed}"
         values = accuracy.drawing_values(self.design, self.deviations)
         rows = zip(SOURCES, values.tolist(), accuracy.UNITS, strict=True)

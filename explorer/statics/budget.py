@@ -38,7 +38,7 @@ PARTS: tuple[str, ...] = (
 
 @dataclass(frozen=True)
 class SourceCosts:
-    """What errors of the sources cost in precision, at worst over positions.
+    """The loss of precision by errors of the sources, at worst over positions.
 
     Arrays of shape (29,) have the order of `SOURCES`. Errors are in mm, and in degrees for a tilt.
 
@@ -84,7 +84,7 @@ class SourceCosts:
 
 
 def source_costs(configuration: Configuration) -> SourceCosts:
-    """Return what the errors and tolerances of a design cost in precision over positions.
+    """Return the loss of precision by a design's errors and tolerances over positions.
 
     The poses have one orientation; for the errors raised see `source_influences`.
     """

@@ -23,7 +23,7 @@ from explorer.numerics.arrays import FloatArray, finite_array, lengths_of, posit
 from explorer.numerics.compiled import helper, kernel
 
 RIGID = "joints, carriages, guide, platform and base"
-"""What counts as rigid, in words."""
+"""The definition of rigid, in words."""
 
 # Number of halvings, of the logarithm where it can be, that find the worst force to rounding.
 HALVINGS = 70

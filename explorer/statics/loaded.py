@@ -83,7 +83,7 @@ class LoadedPose(Configuration):
 
     @cached_property
     def carried(self) -> Carried:
-        """What all weights do."""
+        """The effect of all weights."""
         return carry(self, self.weights)
 
     @cached_property

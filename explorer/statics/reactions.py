@@ -36,7 +36,7 @@ _MOMENTS, _ACROSS_2, _ACROSS_3 = slice(6, 8), slice(8, 10), slice(10, 12)
 
 
 class Reactions(NamedTuple):
-    """What holds a load in a pose; in a singular pose all but the spread is infinite.
+    """The reactions that hold a load in a pose; in a singular pose all but the spread is infinite.
 
     Attributes:
         actuators: Forces in the order of `JOINTS`, shape (..., 6), in N; positive ones push.

@@ -47,7 +47,7 @@ class Workspace:
         self.signs = signs
 
     def __getstate__(self) -> dict[str, object]:
-        """Return what defines the value; another process computes what follows from it again."""
+        """Return the arguments alone; another process computes what follows from them again."""
         return {"design": self.design, "rotation": self.rotation, "signs": self.signs}
 
     def __repr__(self) -> str:

@@ -77,7 +77,7 @@ def _limits_of(switch: Switch) -> list[Limit]:
 
 
 def _visible_value(state: State, limit: Limit, entry: LimitSlider) -> Any:
-    """Return what a slider shows: a number, or the ends of a range."""
+    """Return the value that a slider shows: a number, or the ends of a range."""
     value = _value(state, limit)
     if entry.is_number:
         return value

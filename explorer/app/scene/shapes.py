@@ -216,7 +216,7 @@ def linear_colour(colour: Rgb) -> Rgb:
 
 @functools.lru_cache(maxsize=256)
 def of_one_colour(colour: Rgb, count: int) -> NDArray[np.uint8]:
-    """Return what makes both ends of segments look one colour, shape (count, 2, 3); read only."""
+    """Return vertex colours of `count` segments of one colour, shape (count, 2, 3); read only."""
     colours = np.tile(np.array(linear_colour(colour), dtype=np.uint8), (count, 2, 1))
     colours.flags.writeable = False
     return colours

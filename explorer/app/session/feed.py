@@ -115,7 +115,7 @@ class Feed(Generic[Request, Drawing]):
 
     @property
     def part(self) -> object:
-        """What has arrived of a drawing that is not complete; None if there is no such drawing."""
+        """The part of an incomplete drawing that has arrived; None if there is no such drawing."""
         return None if self.request is None or self.is_cancelled else self._part
 
     @property

@@ -47,7 +47,7 @@ class Action(ABC):
         ...
 
     def words(self) -> str:
-        """Return what the action does; "{design}" stands for the name of the design after it."""
+        """Return the words for the action; "{design}" stands for the design's name after it."""
         if self.template:
             return self.template.format(action=self, design=DESIGN)
         # "SetRequest" reads "Request".
@@ -163,7 +163,7 @@ class Set(Action):
         return replace(state.in_unit_of(design), design=design)
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         name = self.name or self.at.rpartition(".")[2].replace("_", " ").capitalize()
         if self.text:
             return f"{name}: {self.text}"

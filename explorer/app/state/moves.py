@@ -112,7 +112,7 @@ class SetAngle(Action):
         return move_to(state, state.pose_at(state.position, orientation), angles)
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         angle = format_number(self.value, 6, size=FULL_TURN)
         return f"{('yaw', 'pitch', 'roll')[self.axis]} = {angle}°"
 
@@ -163,7 +163,7 @@ class SetMode(Action):
         return replace(move_to(state, pose), mode=self.mode)
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         return f"Assembly mode {self.mode} ({mode_name(self.mode)})"
 
 

@@ -71,11 +71,11 @@ class FeaturePart:
         return ""
 
     def on_open(self) -> Self:
-        """Return what stays when another design is opened."""
+        """Return the part for another design."""
         return self
 
     def for_step(self) -> Self:
-        """Return what a step of the history keeps: nothing that goes on."""
+        """Return the part as the history keeps it: without what goes on."""
         return self
 
     def continue_from(self, present: Any) -> Self:
@@ -97,7 +97,7 @@ def new_parts() -> Parts:
 
 
 def keep_on_open(parts: Parts) -> Parts:
-    """Return what stays of the parts when another design is opened."""
+    """Return the parts for another design."""
     return {name: part.on_open() for name, part in parts.items()}
 
 
@@ -110,7 +110,7 @@ Whole = TypeVar("Whole")
 
 
 def parts_kept_on_open(state: Any) -> dict[str, Any]:
-    """Return what stays of a state when another design is opened, by field."""
+    """Return the fields of a state that another design keeps, by name."""
     return {
         field.name: field.metadata["on_open"](getattr(state, field.name))
         for field in fields(state)

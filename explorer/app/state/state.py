@@ -227,7 +227,7 @@ class State:
 
     @property
     def tool(self) -> Triple | None:
-        """That point in the platform frame, in design units; None if it is b4."""
+        """The shown point in the platform frame, in design units; None if it is b4."""
         point = point_of(self.design, self.view.at)
         return point if any(point) else None
 

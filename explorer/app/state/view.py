@@ -1,4 +1,4 @@
-"""What of the mechanism is shown, and how."""
+"""The settings of what is shown of the mechanism, and how."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class WorkspaceView:
 
 @dataclass(frozen=True)
 class OrientationView:
-    """What is drawn of the orientations over the workspace.
+    """The drawn measure of the orientations over the workspace.
 
     Attributes:
         tilts: Whether the greatest tilts at nodes are drawn.
@@ -189,7 +189,7 @@ class SingularView:
 
 @dataclass(frozen=True)
 class View:
-    """What is shown, and how.
+    """The settings of what is shown, and how.
 
     Attributes:
         lengths: The unit in which lengths are shown and typed; the state has design units.

@@ -1,4 +1,4 @@
-"""What an explorer keeps in the user's data folder: designs, session and a log.
+"""The files that an explorer keeps in the user's data folder: designs, session and a log.
 
 Several explorers may share the folder.
 """
@@ -35,7 +35,7 @@ class UserData:
 
 
 def open_user_data(*, resume: bool) -> UserData:
-    """Return what the user's data folder holds; with `resume` the newest session is continued."""
+    """Return the contents of the user's data folder; `resume` continues the newest session."""
     store = SessionFile()
     history, messages = store.resume() if resume else (None, ())
     return UserData(Library(), store, history, messages)

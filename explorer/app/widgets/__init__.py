@@ -1,1 +1,1 @@
-"""What panels are made of: markup, buttons, charts and the theme."""
+"""The parts of panels: markup, buttons, charts and the theme."""

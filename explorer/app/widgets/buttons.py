@@ -208,7 +208,7 @@ def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> s
 
 
 def activity(opens: str, title: str, words: str, share: float | None, buttons: str) -> str:
-    """Return what runs or waits for an answer as HTML for the bar, with a button that opens a tab.
+    """Return running or waiting work as HTML for the bar, with a button that opens a tab.
 
     The share that is done, 0 to 1, is None if it is not known; the buttons that end or answer
     it are HTML.

@@ -227,7 +227,7 @@ def _mode_lines(modes: kinematics.ForwardKinematics, tool: Triple | None) -> Ite
 
 
 def _failure_message(design: Design, joints: FloatArray, squares: FloatArray) -> str:
-    """Return what does not close, and the smallest change of a single joint that closes it."""
+    """Return the tetrahedron that does not close, and the least change of one joint to close it."""
     failures = [
         f"trilateration {index + 1} (tetrahedron {' '.join(TETRAHEDRA[index])}) has "
         f"δ{index + 1}² = {square:.4g}"

@@ -27,7 +27,7 @@ Look = Literal["within", "close", "beyond"]
 """Whether a value keeps its bounds, is close to them, or beyond."""
 
 Kind = Literal["actuator", "dimension"]
-"""What a bar stands for, which the page shows in its colour."""
+"""The meaning of a bar, which the page shows in its colour."""
 
 UTILISATION_EDGES = (0.25, 0.5, 0.75, 1.0)
 """Ends of the bands of utilisation of a limit; the last one is the limit."""
@@ -180,7 +180,7 @@ class Column(msgspec.Struct, frozen=True):
 
     @property
     def around(self) -> list[tuple[str, str]]:
-        """What stands before and behind each number: sign and unit, unless it is infinite."""
+        """The texts before and behind each number: sign and unit, unless it is infinite."""
         units = [self.unit] * len(self.values) if isinstance(self.unit, str) else self.unit
         return [
             (self.before, unit) if math.isfinite(value) else ("", "")

@@ -42,7 +42,7 @@ def verdict(loaded: LoadedPose, load: str = "load") -> block.Statement:
 
 
 def in_singular_pose(loaded: LoadedPose, load: str = "load") -> str:
-    """Return what a load does to a singular pose, which no unique forces hold, in words."""
+    """Return the effect of a load on a singular pose, which no unique forces hold, in words."""
     work, held = "no work", "it is held, but by no unique forces"
     if loaded.moves_platform:
         work, held = "work", "no forces hold it"

@@ -29,7 +29,7 @@ LARGEST_GAIN = 1e9
 
 
 def colour_words(warn: Warnings, unit: Unit) -> str:
-    """Return what the colour of an incidence means, given the warning values."""
+    """Return the meaning of an incidence's colour, given the warning values."""
     return (
         "The colour of an incidence: the least of its measures over their warning values, which "
         f"are {unit.text(warn.margin, 3)} of the margin, "
@@ -161,7 +161,7 @@ def stratum_words(stratum: Stratum) -> str:
 
 
 def stratum_sentence(stratum: Stratum) -> str:
-    """Return what holds in a stratum, such as "δ1 = 0: a1 on the platform plane"."""
+    """Return the incidences of a stratum in words, such as "δ1 = 0: a1 on the platform plane"."""
     if stratum == GENERIC:
         return "no incidence, not singular"
     zero = ", ".join(f"δ{index}" for index in incidences(stratum))
@@ -169,7 +169,7 @@ def stratum_sentence(stratum: Stratum) -> str:
 
 
 def freedoms(snapshot: Snapshot, unit: Unit = UNITS) -> Iterator[block.Statement]:
-    """Yield what locked actuators let the platform do; nothing in a pose that is not singular."""
+    """Yield the freedoms that locked actuators leave the platform; none in a regular pose."""
     if not snapshot.is_singular:
         return
     found = snapshot.freedoms

@@ -227,7 +227,7 @@ BEYOND = 0.05
 TOLD = 1e-6
 
 Cause = Literal["error", "deflection"]
-"""What displaces the tool: the actuators' errors, or the design's load."""
+"""The causes that displace the tool: the actuators' errors, or the design's load."""
 
 
 def spare_of(share: FloatArray) -> FloatArray:
@@ -239,12 +239,12 @@ def spare_of(share: FloatArray) -> FloatArray:
 
 
 def _spare(share: FloatArray, by: FloatArray) -> Measured:
-    """Return what shares of a limit leave, with their derivatives (m, n)."""
+    """Return the slack of utilisations of a limit, with their derivatives (m, n)."""
     return Measured(spare_of(share), by * (-1.0 / np.maximum(1.0, share) ** 2)[:, None])
 
 
 class StaticsDemand(SearchDemand):
-    """What parts of the machine have everywhere in the required box must be at most something.
+    """A bound on a quantity of parts of the machine everywhere in the required box.
 
     A search looks at the corners of the box, and where more was found later. If nothing is given,
     the largest at the start is, so that the values are of unit size, and what is proven is that
@@ -259,7 +259,7 @@ class StaticsDemand(SearchDemand):
         self.names = (*parts,) * len(self.places)
 
     def measure(self, state: SearchState) -> Measured:
-        """Return what each part has to spare at each place, less a reserve; see `spare_of`."""
+        """Return the slack of each part at each place, less a reserve; see `spare_of`."""
         lows, highs = np.array(state.box)
         positions = lows + self.places * (highs - lows)
         counts, parts = self.side.keeps(state, positions), range(len(self.parts))
@@ -292,7 +292,7 @@ class StaticsDemand(SearchDemand):
 
     @abstractmethod
     def _spares(self, state: SearchState, positions: FloatArray) -> Measured:
-        """Return what m parts have to spare at k positions, k · m values."""
+        """Return the slacks of m parts at k positions, k · m values."""
 
     @abstractmethod
     def _prove(self, state: SearchState, most: float) -> list[Proof]:

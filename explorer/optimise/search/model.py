@@ -112,7 +112,7 @@ class SearchModel:
         return found
 
     def unproven_clearance(self, at: Evaluation) -> list[Proof]:
-        """Return what is not proven of the clearance that a relaxed problem leaves out."""
+        """Return the unproven pairs of the clearance that a relaxed problem leaves out."""
         return self._left_out.look_at_unproven(at.state) if self._left_out else []
 
     def at(self, u: FloatArray) -> Evaluation:
@@ -183,7 +183,7 @@ class SearchModel:
         return value if spare[index] < 0.0 else max(0.0, value), self.names[index]
 
     def worst_of_all(self, at: Evaluation) -> tuple[float, str]:
-        """Return what `worst` does with the clearance too, at its positions, if it is left out."""
+        """Return the worst demand, the clearance included even while the search omits it."""
         spare, name = self.worst(at)
         if self._left_out is None:
             return spare, name

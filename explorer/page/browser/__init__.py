@@ -1,1 +1,1 @@
-"""What the explorer adds to viser's page, and the browser that takes pictures of it."""
+"""Additions to viser's page, and the browser that takes pictures of it."""

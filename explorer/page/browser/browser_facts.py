@@ -1,4 +1,4 @@
-"""What only a browser knows: when its user presses and releases, and whether it is answered.
+"""Facts that only a browser knows: when its user presses and releases, and whether it is answered.
 
 viser reports values alone. So scripts of the page write the rest to hidden fields, by the same way
 and in the same order as the values of other controls: a value is known to come from the press
@@ -22,7 +22,7 @@ Described = TypeVar("Described")
 
 
 def decode_text(text: str, decoder: msgspec.json.Decoder[Described]) -> Described | None:
-    """Return what a text from a browser describes; None if no script of the page wrote it."""
+    """Return the facts in a text from a browser; None if no script of the page wrote it."""
     try:
         return decoder.decode(text)
     except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError):

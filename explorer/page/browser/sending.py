@@ -1,4 +1,4 @@
-"""What one browser is sent: parts of the scene once they are in sight, and no value twice.
+"""The messages to one browser: parts of the scene once they are in sight, and no value twice.
 
 viser keeps the last message on each thing, and sends all of them to a browser that connects: the
 mesh of each hidden part, and with each value that has changed the one that it had at first.
@@ -43,7 +43,7 @@ class Sending:
     async def filtered(
         self, windows: AsyncGenerator[Sequence[Message]], backlog_end: Message | None
     ) -> AsyncGenerator[Sequence[Message]]:
-        """Yield what is sent of windows of messages that are due.
+        """Yield the messages to send, of windows of messages that are due.
 
         Args:
             windows: Messages to all browsers, or to this one alone.
@@ -61,12 +61,12 @@ class Sending:
                     yield chosen
 
     def backlog(self, messages: Iterable[Message]) -> list[Message]:
-        """Return what is sent at first of messages to all browsers."""
+        """Return the messages for a new browser, of those to all browsers."""
         taken = [message for each in messages for message in self._take(each, is_own=False)]
         return [*taken, *self._end_backlog()]
 
     def _take(self, message: Message, *, is_own: bool) -> Iterator[Message]:
-        """Yield what is sent in the place of a message that is due."""
+        """Yield the messages that take the place of one that is due."""
         kind, name = _subject_of(message)
         phase = message.lifecycle_phase
         if kind == "gui" and self._is_backlog and not is_own:

@@ -1,1 +1,1 @@
-"""What an action may know of the control that asked for it."""
+"""Facts on the control that asked for an action."""

@@ -200,7 +200,7 @@ def _snap(cut: _Cut, surfaces: Surfaces, values: FloatArray, rounding: float) ->
 
 
 def _cut_by(cut: _Cut, surfaces: Surfaces, index: int, rounding: float) -> _Cut:
-    """Return what is left of triangles within the limit with an index."""
+    """Return the triangles, cut by the limit with an index."""
     value = surfaces.distances_from(cut.vertices, index)
     value[cut.owner == index] = np.inf
     at = (np.abs(value) <= rounding) | (cut.cuts >> index & 1 == 1)

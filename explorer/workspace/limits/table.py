@@ -26,7 +26,7 @@ from explorer.workspace.limits.quantities import Bound, Demand, LegAngle
 
 @dataclass(frozen=True)
 class LimitCase:
-    """What the demands of a limit follow from.
+    """The data that the demands of a limit follow from.
 
     Attributes:
         design: The manipulator.

@@ -65,7 +65,7 @@ class Unpin(Action):
     slot: int
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         return f"Unpin {SLOTS[self.slot]}"
 
     def apply(self, state: State) -> State:
@@ -223,7 +223,7 @@ class ComparePanel:
         return dict(itertools.islice(named.items(), MOST_BUTTONS))
 
     def _pin(self, name: str) -> Change | None:
-        """Return what pins the live design for "", or the one with a name."""
+        """Return the action that pins the named design, or the live one for ""."""
         chosen = self._choices().get(name)
         return None if name and chosen is None else lambda state: Pin(chosen or state.design)
 

@@ -58,7 +58,7 @@ class SetForce(Action):
         return replace(state, view=replace(state.view, forces=forces))
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         numbers = ", ".join(format_number(value, 3) for value in self.force)
         return f"Force {numbers} N"
 

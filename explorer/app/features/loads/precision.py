@@ -179,7 +179,7 @@ class PrecisionPanel:
 
 
 def offer(what: str, typical: Iterable[str], button: str) -> str:
-    """Return what a design can be given, and the button that gives it typical values, as HTML."""
+    """Return the inputs that a design lacks, and a button for typical values, as HTML."""
     words = f"State {what} in the tab Machine, or assume typical ones: {'; '.join(typical)}."
     return box(f"{dim(words)} {button}")
 

@@ -75,7 +75,7 @@ class SetToolAngle(Action):
         return replace(changed, set_tool_angles=angles)
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         angle = format_number(self.value, 6, size=FULL_TURN)
         return f"tool {ANGLES[self.axis][0]} = {angle}°"
 

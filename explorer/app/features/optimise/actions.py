@@ -108,7 +108,7 @@ class LiftLimit(Action):
 
     @property
     def title(self) -> str:
-        """What it does, such as "Lift the box"."""
+        """The label, such as "Lift the box"."""
         if self.limit == MAXIMA:
             return "Tie all maximum lengths to the reach"
         name, _, end = self.limit.partition(" ")

@@ -29,7 +29,7 @@ PLACE = "place"
 
 @dataclass(frozen=True)
 class OptimisationRequest:
-    """What the user requests; lengths in design units.
+    """The user's request; lengths in design units.
 
     Attributes:
         volume: Volume to match, or the least one; None for one that suits the design.
@@ -185,7 +185,7 @@ class Optimisation(FeaturePart, name="optimisation"):
         return "the design is being optimised" if self.is_on else ""
 
     def on_open(self) -> Self:
-        """Return what stays when another design is opened: the request and the count of runs."""
+        """Return the part for another design: the request and the count of runs."""
         return replace(self, run=None)
 
     def continue_from(self, present: Self) -> Self:

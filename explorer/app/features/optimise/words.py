@@ -85,7 +85,7 @@ def search_notice(state: State) -> Notice | None:
 
 
 def _reached_text(problem: problems.Problem, iterate: Iterate, state: State) -> str:
-    """Return what a search has reached: the volume that it matches, or the objective."""
+    """Return the result of a search: the volume that it matches, or the objective."""
     unit = goal_unit(problem.objective, state)
     if problem.objective == "match-volume":
         return f"volume {unit.text(iterate.volume, 5)}"

@@ -60,7 +60,7 @@ class SetTiltTorsion(Action):
         return _tilt_to(state, state.tilt_torsion._replace(**{ANGLES[self.axis]: self.value}))
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         return f"{ANGLES[self.axis]} = {format_number(self.value, 6, size=FULL_TURN)}°"
 
 
@@ -93,7 +93,7 @@ class GoToTilt(Action):
         return replace(after, taken=(after.joints, words))
 
     def describe(self, after: State) -> str:
-        """Return what the action did."""
+        """Return the words for the action."""
         tilt, azimuth = (
             format_number(angle, 4) for angle in (after.tilt_torsion.tilt, self.azimuth)
         )

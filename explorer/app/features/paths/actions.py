@@ -136,7 +136,7 @@ class SetPathTime(Action):
         return _go_along(state, replace(journey, at=at))
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         return f"Path at {format_number(self.seconds, 3)} s"
 
 

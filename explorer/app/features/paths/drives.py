@@ -57,7 +57,7 @@ class DrivesPanel:
 
 @lru_cache(2)
 def drives_html(drawing: DrivesDrawing | ExplorerError) -> str:
-    """Return what a path asks of the actuators, or why there is no answer, as HTML."""
+    """Return the actuators' speeds, forces and powers along a path, or why none, as HTML."""
     if isinstance(drawing, ExplorerError):
         return alert("No speeds and forces", sentence(str(drawing)))
     return f'{render(drawing.blocks)}<div class="ex-map ex-drives">{drawing.charts}</div>'

@@ -133,11 +133,11 @@ class Paths(FeaturePart, name="paths"):
                 )
 
     def on_open(self) -> Self:
-        """Return what stays when another design is opened: the settings of the next path."""
+        """Return the part for another design: the settings of the next path."""
         return replace(self, planning=None, problem=None, journey=None)
 
     def for_step(self) -> Self:
-        """Return what a step of the history keeps: without planning and playing."""
+        """Return the part as the history keeps it: without planning and playing."""
         journey = None if self.journey is None else replace(self.journey, is_playing=False)
         return replace(self, planning=None, journey=journey)
 

@@ -1,4 +1,4 @@
-"""What the path of the page asks of the actuators, computed and drawn in the worker."""
+"""The actuators' speeds, forces and powers along the page's path, in the worker."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DrivesRequest: TypeAlias = tuple[Design, TimedPath]
 
 @dataclass(frozen=True, eq=False)
 class DrivesDrawing:
-    """What a path asks of the actuators, and its charts as SVG."""
+    """The actuators' speeds, forces and powers along a path, and the charts as SVG."""
 
     blocks: tuple[Block, ...]
     charts: str
@@ -38,7 +38,7 @@ def request_for(state: State) -> DrivesRequest | None:
 
 
 def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:
-    """Return what a path asks of the actuators with its charts, or why there is no answer."""
+    """Return the actuators' speeds, forces and powers along a path, or why there are none."""
     try:
         found = drives_along(*request)
     except ExplorerError as error:

@@ -26,7 +26,7 @@ from explorer.prototype.sizes import StrokeRange
 
 MEND = "prototype.mend"
 FITTING, STROKES = "fitting", "strokes"
-"""What a press mends: the unit and home of parts that do not fit, or limits beyond the strokes."""
+"""The kinds of repair: unit and home for parts that do not fit, or limits beyond the strokes."""
 STROKES_WORDS = "Limit the lengths to the strokes"
 STROKES_HINT = (
     "Set the limits of the lengths to what a rod in its cylinder reaches; the workspace may shrink."

@@ -53,7 +53,7 @@ class GoToStratum(Action):
         return move_to(state, nearest.pose)
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         return f"Go to stratum {stratum_name(self.stratum)}"
 
 
@@ -79,7 +79,7 @@ class GoToSingularity(Action):
         return move_to(state, nearest.pose)
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         if self.incidence is None:
             return "Go to the nearest singular pose"
         return f"Go to the nearest pose with δ{self.incidence} = 0"

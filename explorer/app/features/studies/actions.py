@@ -31,7 +31,7 @@ class OpenStudy(Action):
         return with_value(state, "studies", studies)
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         return "Close the study" if self.name is None else f"Study {self.name}"
 
 
@@ -50,7 +50,7 @@ class BrushAxes(Action):
         return with_value(state, "studies", studies)
 
     def words(self) -> str:
-        """Return what the action does."""
+        """Return the words for the action."""
         verb = "Filter" if any(brush.ranges for brush in self.brushes) else "Free"
         return f"{verb} {' and '.join(label_of(brush.axis) for brush in self.brushes)}"
 

@@ -73,7 +73,7 @@ Pixels = Annotated[float, msgspec.Meta(gt=0.0)]
 
 
 class PlotEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a pointer does to a plot, from the start to the end of its way; the size is in pixels.
+    """A gesture of a pointer on a plot, from its start to its end; the size is in pixels.
 
     It reads or picks the design at the end, brushes the axes of a box, or frees all axes.
     """

@@ -252,7 +252,7 @@ def brushes_in(plotted: PlotRows, plot: PlotName, corner: Place, other: Place) -
 
 
 def reading_of(plotted: PlotRows, plot: PlotName, row: int | None) -> tuple[str, str]:
-    """Return what is read at a row of a plot and its path, both "" for none."""
+    """Return the reading at a row of a plot and its path, both "" for none."""
     if row is None:
         return "", ""
     values = [(name, float(plotted.column(name)[row])) for name in plotted.axes_of(plot)]

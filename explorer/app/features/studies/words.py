@@ -78,7 +78,7 @@ def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
 
 
 def _summary(study: Study) -> str:
-    """Return what a study varies and what its objectives are, in one line."""
+    """Return the variables and the objectives of a study, in one line."""
     objectives = ", ".join(
         f"{label_of(objective.measure)} {ARROWS[objective.sense]}" for objective in study.objectives
     )

@@ -42,7 +42,7 @@ def orientation_word(frame: Frame) -> str:
 
 
 def orientation_suffix(design: Design, rotation: work.Rows) -> str:
-    """Return what follows the names of a workspace's measures; "" in the orientation of home."""
+    """Return the suffix of the names of a workspace's measures; "" in the orientation of home."""
     is_home = np.allclose(rotation, design.home_pose.rotation, atol=SAME)
     return "" if is_home else ", turned"
 

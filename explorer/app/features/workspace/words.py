@@ -34,7 +34,7 @@ from explorer.statics.reactions import has_limits
 CLAIM = "claims.md#The designs of Table 1 have the printed extents and a volume of 7992."
 """The place in the manual that explains the paper's volume of its optimum."""
 PAPER_COUNT = 7992.0
-"""That volume, in cubed design units."""
+"""The volume of the paper's optimum, in cubed design units."""
 
 
 def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume]) -> str:
@@ -59,7 +59,7 @@ def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume
 
 
 def _paper_words(unit: Unit) -> str:
-    """Return what the paper says of the volume of its optimum, as HTML."""
+    """Return the paper's statement on the volume of its optimum, as HTML."""
     why = press_button(MANUAL, CLAIM, "why", class_name="ex-link")
     counted = unit.text(PAPER_COUNT)
     return f"<div>{markup.dim(f'The paper counts {counted} by nodes of a grid: {why}')}</div>"
@@ -106,7 +106,7 @@ def nothing_words(drawing: work.WorkspaceDrawing) -> str:
 
 
 def load_words(state: State, *, any_direction: bool = True) -> str:
-    """Return what loads the platform over the workspace, without a full stop.
+    """Return the loads on the platform over the workspace in words, without a full stop.
 
     The payload's force counts if it may have `any_direction`.
     """
