@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import GUIDE_ROWS, STRUT_ROWS, Design
 from explorer.motion.inverse_jacobian import forces_of, twists_of_actuators
 from explorer.numerics.arrays import FloatArray, IntArray, positive_array
-from explorer.statics.reactions import reactions
 
 
 class WorstDirection(NamedTuple):
@@ -55,7 +54,12 @@ def strut_bending(
     They are |f(d1)| d2 and |f(d3)| d4; the guide takes the same moments. Both are infinite in a
     singular pose. The arguments are those of `Configuration` and the load of `forces_of`.
     """
-    return reactions(Configuration(design, position, rotation, tool), load).bending
+    c = Configuration(design, position, rotation, tool)
+    along = np.abs(forces_of(c, load)[..., GUIDE_ROWS])
+    # An infinite force gives an infinite moment, even if its strut has no length.
+    with np.errstate(invalid="ignore"):
+        moments = along * c.joints[..., STRUT_ROWS]
+    return np.where(np.isinf(along), np.inf, moments)
 
 
 def largest_force(
