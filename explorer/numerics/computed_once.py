@@ -31,10 +31,11 @@ def computed_once(
     def result_of(owner: Owner, /, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
         results = vars(owner).setdefault(name, {})
         key = args, frozenset(item for item in kwargs.items() if item[0] != WATCH)
-        if key not in results:
-            results[key] = function(owner, *args, **kwargs)
-            if len(results) > KEPT:
-                del results[next(iter(results))]
-        return results[key]
+        if key in results:
+            return results[key]
+        results[key] = result = function(owner, *args, **kwargs)
+        if len(results) > KEPT:
+            del results[next(iter(results))]
+        return result
 
     return result_of

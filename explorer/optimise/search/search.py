@@ -33,7 +33,7 @@ from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimali
 from explorer.optimise.search.starts import open_workspace, promising_starts
 from explorer.optimise.search.state import SearchState, scales
 from explorer.proofs.proof import Proof
-from explorer.workspace.slices.volume import find_emptying_limits, unexplained_volume
+from explorer.workspace.slices.volume import emptying_limits, unexplained_volume
 
 # Largest F = |1 − V/V′| of a matched volume.
 MATCHED = 1e-10
@@ -131,7 +131,7 @@ class Search:
             if self._is_closed(u):
                 nearby = open_workspace(problem, u, see=self._see_opening)
                 if nearby is None:
-                    because = find_emptying_limits(SearchState(problem, u).workspace.limits)
+                    because = emptying_limits(SearchState(problem, u).workspace)
                     words = (
                         f"the workspace is empty because of {', '.join(because)}, and no "
                         "design nearby opens it"
@@ -303,7 +303,7 @@ class Search:
             status = "not converged" if self.steps_left <= 0 else "infeasible"
             return Attempt(status, worst if spare < 0.0 else holding, "", best)
         if at.state.volume <= 0.0:
-            because = ", ".join(find_emptying_limits(at.state.workspace.limits))
+            because = ", ".join(emptying_limits(at.state.workspace))
             words = f"the workspace of the best design found is empty because of {because}"
             return Attempt("infeasible", because, words, best)
         return Attempt("stalled", holding, "", best)

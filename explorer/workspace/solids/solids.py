@@ -31,6 +31,7 @@ from explorer.workspace.limits.constraints import (
 )
 from explorer.workspace.limits.region import box_of, contract_box, region_of
 from explorer.workspace.slices.volume import (
+    emptying_limits,
     find_emptying_limits,
     region_volume,
     unexplained_volume,
@@ -85,7 +86,7 @@ def whole_solid(workspace: Workspace, tolerance: float | None = None) -> Solid:
     exact, limits = unexplained_volume(workspace), workspace.limits
     frame = _frame_of([limits], workspace.design.reach, tolerance)
     solid = _make_agreeing_solid(limits, frame, (exact.volume, 2.0 * exact.error))
-    return replace(solid, empty_because=find_emptying_limits(limits)) if solid.is_empty else solid
+    return replace(solid, empty_because=emptying_limits(workspace)) if solid.is_empty else solid
 
 
 def _limits_over(
