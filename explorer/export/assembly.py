@@ -14,8 +14,8 @@ from typing import Any
 
 from explorer.export import mesh, opencascade as cad
 from explorer.files.writing import zip_bytes
+from explorer.mechanism.rgb import Rgb
 from explorer.motion.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE
-from explorer.numerics.rgb import Rgb
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.shapes import forms_of
 from explorer.prototype.sizes import Sizes

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from explorer import __version__
 from explorer.errors import ExplorerError, InputError, NoAnswerError
 from explorer.mechanism.design import Design
+from explorer.mechanism.rgb import Rgb, linear
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb, linear
 from explorer.workspace.solids.solid import Solid
 
 APPLICATION = f"flagged-explorer {__version__}"

@@ -17,10 +17,10 @@ import numpy as np
 from explorer import __version__
 from explorer.export.controller import limit_rows, pair_rows, read_template
 from explorer.legs.clearance import PAIRS, pair_name
+from explorer.mechanism import rgb
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Swing
 from explorer.mechanism.feasible_intervals import possible_ranges
 from explorer.mechanism.margins import INCIDENCES
-from explorer.prototype import body_colours
 from explorer.singularity import colours
 from explorer.workspace.limits import quantities
 
@@ -104,20 +104,20 @@ def page_data(design: Design) -> dict[str, Any]:
             }.items()
         },
         "colours": {
-            "tube": body_colours.TUBE,
-            "rod": body_colours.ROD,
-            "joint": body_colours.JOINT,
-            "ball": body_colours.BALL,
-            "base": body_colours.BASE_BODY,
-            "platform": body_colours.PLATFORM_BODY,
-            "rail": body_colours.RAIL,
-            "carriage": body_colours.CARRIAGE,
-            "leaves": body_colours.LEAVES,
+            "tube": rgb.TUBE,
+            "rod": rgb.ROD,
+            "joint": rgb.JOINT,
+            "ball": rgb.BALL,
+            "base": rgb.BASE_BODY,
+            "platform": rgb.PLATFORM_BODY,
+            "rail": rgb.RAIL,
+            "carriage": rgb.CARRIAGE,
+            "leaves": rgb.LEAVES,
             "singular": colours.SINGULAR,
             "warned": colours.WARNED,
             "clear": colours.CLEAR,
             "far": colours.FAR,
-            "alarm": body_colours.OUTLINE,
+            "alarm": rgb.OUTLINE,
             "margins": colours.MARGIN_COLOURS,
         },
     }

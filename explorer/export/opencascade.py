@@ -20,8 +20,8 @@ from explorer.errors import ExplorerError
 from explorer.export.mesh import printable_name
 from explorer.files.extras import load_extra
 from explorer.mechanism.pose import Triple
+from explorer.mechanism.rgb import Rgb, linear
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb, linear
 from explorer.prototype.shapes import Circle, ShapeMaker
 
 SCHEMA = "AP242DIS"

@@ -19,10 +19,10 @@ from explorer.measures.blocks.block import UTILISATION_EDGES
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import NO_LOAD
+from explorer.mechanism.rgb import Rgb, mix
 from explorer.motion.weights import payload_wrench
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.computed_once import computed_once
-from explorer.numerics.rgb import Rgb, mix
 from explorer.singularity import colours
 from explorer.singularity.colours import CLEAR, FAR, SINGULAR, WARNED
 from explorer.statics.accuracy import actuator_errors, worst_errors

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 
-from explorer.numerics.rgb import Rgb, mix
+from explorer.mechanism.rgb import Rgb, mix
 
 SINGULAR: Rgb = (196, 52, 8)
 WARNED: Rgb = (246, 178, 76)

@@ -1,11 +1,11 @@
 """The carried region: the part of a workspace in which the machine carries a load, and its solid.
 
-Its volume is that of columns (`explorer.workspace.slices.columns`). For the solid each limit of a
-part of the machine is a surface of its own, which is smooth where it bounds the workspace. A grid
-of positions finds it, and each of its vertices is moved onto the true surface, so that only the
-flatness of the faces between vertices is approximate. Booleans cut one surface after the other out
-of the workspace, so that creases between limits and parts that are thinner than a cell of the grid
-are kept.
+Its volume is that of columns (`explorer.workspace.slices.column_volume`). For the solid each limit
+of a part of the machine is a surface of its own, which is smooth where it bounds the workspace. A
+grid of positions finds it, and each of its vertices is moved onto the true surface, so that only
+the flatness of the faces between vertices is approximate. Booleans cut one surface after the other
+out of the workspace, so that creases between limits and parts that are thinner than a cell of the
+grid are kept.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from explorer.statics import load_cases
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.nodes import Grid, make_grid
 from explorer.workspace.limits.constraints import Cone, HalfSpace
-from explorer.workspace.slices.columns import ColumnVolume, volume_of_columns
+from explorer.workspace.slices.column_volume import ColumnVolume, volume_of_columns
 from explorer.workspace.slices.volume import volume_of
 from explorer.workspace.solids.solid import Solid, Surface, carved_solid, cut_solid
 from explorer.workspace.solids.solids import whole_solid
@@ -107,7 +107,7 @@ def carried_region(
     On a singular plane no unique forces hold a load, so that only positions with the signs of
     the margins count that the home pose has in its own orientation. The payload's weight and its
     force of any direction act besides the load; the legs count as weightless. Pieces are missed
-    that lie between 65² columns along x, see `explorer.workspace.slices.columns`.
+    that lie between 65² columns along x, see `explorer.workspace.slices.column_volume`.
 
     Args:
         workspace: The workspace of a design with its payload and its limits.

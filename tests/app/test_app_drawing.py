@@ -40,11 +40,10 @@ from explorer.app.widgets import charts
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.mechanism.rgb import OUTLINE, Rgb
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_fitted
-from explorer.numerics.rgb import Rgb
 from explorer.page.look import read_stylesheet
-from explorer.prototype.body_colours import OUTLINE
 from explorer.singularity.colours import FAR_WARNINGS, proximity_colour
 
 OPTIMAL = PRESETS["paper-optimal"]

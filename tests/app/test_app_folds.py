@@ -39,8 +39,8 @@ from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.folds import FOLDS, to_folds
 from explorer.mechanism.margins import margins, mode_of, signs_of
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb
 from explorer.singularity.colours import SINGULAR, proximity_colour
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -54,9 +54,9 @@ from explorer.measures.blocks.clearances import DIGITS, pose_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.mechanism.rgb import OUTLINE, TUBE
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.prototype.body_colours import OUTLINE, TUBE
 from explorer.workspace.accessible.nodes import InvalidStartError, check_start
 from explorer.workspace.accessible.radii import RadiusCurve
 from explorer.workspace.least_clearance import least_clearances

@@ -32,9 +32,9 @@ from explorer.app.state.state import State, open_state
 from explorer.app.state.view import WorkspaceView
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.rgb import css
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_from_rotation, tilt_torsion_of
 from explorer.numerics.number_text import UNITS
-from explorer.numerics.rgb import css
 from explorer.workspace.orientations.share import cone_of_directions, orientation_share
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,

@@ -51,10 +51,10 @@ from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Payload
 from explorer.mechanism.pose import Pose
+from explorer.mechanism.rgb import OUTLINE
 from explorer.motion.chains import LEGS, ON_GUIDE, Places
 from explorer.page.widgets.assigning import Assigner
 from explorer.prototype.assembly import bill_of_materials, make_prototype
-from explorer.prototype.body_colours import OUTLINE
 from explorer.prototype.fitting import broken_joint_limits, buildability
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -32,8 +32,8 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import jacobian_factors
 from explorer.mechanism.margins import describe_modes
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
+from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import Unit
-from explorer.numerics.rgb import css
 from explorer.singularity.colours import SINGULAR, WARN_SHARE, WARNED, proximity_colour
 from explorer.singularity.strata import COVERED, OF_INCIDENCES, incidences
 from explorer.workspace.workspace import Workspace

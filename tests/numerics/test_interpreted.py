@@ -17,7 +17,7 @@ from explorer.statics.load_cases import largest_shares, limit_values, load_case,
 from explorer.statics.slopes import twist_slopes
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map, torsion_range
-from explorer.workspace.slices.columns import volume_of_columns
+from explorer.workspace.slices.column_volume import volume_of_columns
 from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from explorer.app.scene.shapes import COMPARED
+from explorer.mechanism.rgb import OUTLINE, Rgb
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb
-from explorer.prototype.body_colours import OUTLINE
 from explorer.singularity.colours import FAR_WARNINGS, MARGIN_COLOURS, margin_text, proximity_colour
 
 LIGHT, DARK = (255, 255, 255), (36, 36, 36)

@@ -15,7 +15,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.statics.load_cases import load_case
 from explorer.workspace.limits.constraints import BallOrCylinder
 from explorer.workspace.limits.region import Region, region_of
-from explorer.workspace.slices.columns import ColumnVolume, volume_of_columns
+from explorer.workspace.slices.column_volume import ColumnVolume, volume_of_columns
 from explorer.workspace.slices.volume import region_volume
 from explorer.workspace.workspace import Workspace
 
@@ -70,7 +70,7 @@ def test_with_a_load_the_volume_is_that_of_finer_columns(
 ) -> None:
     region, case, rotation = random_loaded(seed)
     found = volume_of_columns(region, TOLERANCE, case, rotation)
-    monkeypatch.setattr("explorer.workspace.slices.columns.PANELS", 40)
+    monkeypatch.setattr("explorer.workspace.slices.column_volume.PANELS", 40)
     fine = volume_of_columns(region, FINE, case, rotation)
     check(found, fine.volume, fine.error)
     assert (found.box[0] <= fine.box[1]).all()

@@ -9,8 +9,8 @@ import viser
 
 from explorer.app.scene.shapes import add_label, add_lines, add_translucent, sphere, write_label
 from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Update
 from explorer.singularity.colours import FAR
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from explorer.app.widgets.charts import NEUTRAL
+from explorer.mechanism.rgb import Rgb, linear
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.numerics.rgb import Rgb, linear
 from explorer.page.widgets.assigning import Update
 
 # Colours of the scene, besides those of `explorer.singularity.colours`.

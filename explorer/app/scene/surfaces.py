@@ -25,10 +25,9 @@ from scipy.sparse import csgraph
 from explorer.measures.position_bands import PositionBands, PositionMeasure, position_bands
 from explorer.mechanism.machine import NO_LOAD, Six
 from explorer.mechanism.margins import planes_of_singularity
+from explorer.mechanism.rgb import OUTLINE, Rgb, mix
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
-from explorer.numerics.rgb import Rgb, mix
 from explorer.numerics.roots import find_roots
-from explorer.prototype.body_colours import OUTLINE
 from explorer.singularity.colours import SINGULAR, WARNED
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.workspace import PAIR_NAMES

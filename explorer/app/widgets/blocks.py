@@ -11,8 +11,8 @@ from explorer.app.widgets.markup import box, caption, dim, meter, row, swatch, t
 from explorer.measures.blocks import block as kinds
 from explorer.measures.blocks.block import UTILISATION_EDGES
 from explorer.measures.position_bands import UTILISATION_COLOURS
+from explorer.mechanism.rgb import Rgb, css
 from explorer.numerics.number_text import format_decimals
-from explorer.numerics.rgb import Rgb, css
 
 KIND_COLOURS: dict[kinds.Kind, Rgb] = {"actuator": BLUE, "dimension": ORANGE}
 # Between the components of a vector, which stay on one line.

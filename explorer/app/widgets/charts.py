@@ -6,7 +6,7 @@ import numpy as np
 import viser
 from viser import uplot
 
-from explorer.numerics.rgb import Rgb, css
+from explorer.mechanism.rgb import Rgb, css
 
 FONT = "11px system-ui, sans-serif"
 

@@ -7,7 +7,7 @@ from html import escape
 from typing import Literal
 
 from explorer.measures.blocks.block import Look
-from explorer.numerics.rgb import Rgb, css
+from explorer.mechanism.rgb import Rgb, css
 from explorer.singularity.colours import MARGIN_COLOURS, margin_text
 
 

@@ -12,7 +12,7 @@ import viser
 
 from explorer.app.session.session import Who
 from explorer.app.widgets.buttons import Buttons
-from explorer.numerics.rgb import Rgb
+from explorer.mechanism.rgb import Rgb
 from explorer.page.browser.viser_gaps import (
     SceneMessage,
     assign_in,

@@ -12,9 +12,9 @@ from explorer.export.drawings.markup import coordinate, drawing_text, element, p
 from explorer.export.drawings.slices import ruler
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import or_infinite
+from explorer.mechanism.rgb import Rgb, css
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.numerics.rgb import Rgb, css
 from explorer.paths.drives import PARTS, PathDrives
 
 # The width of the charts, the height of one over time and of that of forces and speeds, and the

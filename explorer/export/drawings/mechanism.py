@@ -29,9 +29,9 @@ from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import verdict
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import TETRAHEDRA
+from explorer.mechanism.rgb import css
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.numerics.rgb import css
 from explorer.singularity.colours import MARGIN_COLOURS, proximity_colour
 
 ViewName = Literal["isometric", "front", "side", "top"]

@@ -21,10 +21,9 @@ from explorer.export.drawings.mechanism import WIDTH, round_length, svg_drawing
 from explorer.legs.clearance import leg_clearances
 from explorer.measures.position_bands import MEASURE_WORDS, PositionBands, position_bands
 from explorer.mechanism.margins import margins, planes_of_singularity
+from explorer.mechanism.rgb import OUTLINE, css
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.numerics.rgb import css
-from explorer.prototype.body_colours import OUTLINE
 from explorer.singularity.colours import WARN_SHARE
 from explorer.workspace.slices.outline import AXES, Edge, level_loops, slice_outline
 from explorer.workspace.workspace import Workspace

@@ -18,7 +18,7 @@ from explorer.export.drawings.mechanism import ROOM, WIDTH, Projection
 from explorer.export.drawings.slices import Slices
 from explorer.export.mesh import as_trimesh
 from explorer.measures.snapshot import Snapshot
-from explorer.numerics.rgb import css, mix
+from explorer.mechanism.rgb import css, mix
 from explorer.workspace.limits.constraints import HalfSpace
 from explorer.workspace.solids.solid import Solid, cut_solid
 

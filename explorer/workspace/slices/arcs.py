@@ -21,6 +21,7 @@ from typing import NamedTuple
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper
 from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
+from explorer.workspace.slices.polynomials import real_roots
 
 TWO_PI = 2.0 * math.pi
 # Columns of a forbidden arc: angles on a circle, or lengths along a line.
@@ -318,19 +319,6 @@ def add_break(boundary: Boundary, x: float, y: float, z: float, slack: float) ->
             return
     breaks[count] = x
     boundary.number[0] = count + 1
-
-
-@helper
-def real_roots(a: float, b: float, c: float) -> tuple[float, float]:
-    """Return the real roots of a x² + b x + c, nan in place of each missing one."""
-    if a == 0.0:
-        return (-c / b if b != 0.0 else math.nan), math.nan
-    square = b * b - 4.0 * a * c
-    if square < 0.0:
-        return math.nan, math.nan
-    # This form avoids cancellation.
-    q = -0.5 * (b + math.copysign(math.sqrt(square), b))
-    return q / a, (c / q if q != 0.0 else math.nan)
 
 
 @helper

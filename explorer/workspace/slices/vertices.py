@@ -21,10 +21,10 @@ from explorer.workspace.slices.arcs import (
     add_break,
     add_breaks_at_height,
     add_breaks_at_tangencies,
-    real_roots,
     region_size,
     slack_at,
 )
+from explorer.workspace.slices.polynomials import real_roots
 
 # The most steps of Newton's method, which bisects its interval where a step would leave it.
 MOST_STEPS = 100

@@ -16,9 +16,9 @@ from explorer.app.widgets.buttons import press_button
 from explorer.measures.blocks.block import Look
 from explorer.measures.catalogue import CATALOGUE, Measure, Measurements, measures_in
 from explorer.mechanism.design import Design
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics import number_text
 from explorer.numerics.number_text import Unit
-from explorer.numerics.rgb import Rgb
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9

@@ -26,8 +26,8 @@ from explorer.measures.measure import Case
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb
 from explorer.workspace.solids.solids import whole_solid
 
 LIVE, NAMES = 0, ("live", *SLOTS)

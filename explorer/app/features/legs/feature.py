@@ -33,11 +33,10 @@ from explorer.measures.blocks.clearances import move_clearances, pose_clearances
 from explorer.measures.blocks.source import pose_source
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
+from explorer.mechanism.rgb import OUTLINE, Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_number
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
-from explorer.prototype.body_colours import OUTLINE
 from explorer.workspace.accessible.radii import RadiusCurve, with_radius
 
 # Share of the volume without radii; the largest radius that keeps it is marked.

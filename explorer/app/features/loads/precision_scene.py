@@ -14,9 +14,9 @@ from explorer.app.scene import shapes
 from explorer.app.scene.ellipsoid import EllipsoidNode
 from explorer.app.scene.placing import Placed, ScenePart, round_step
 from explorer.measures.blocks.precision import DIGITS
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
 from explorer.statics.compliance import is_elastic
 from explorer.statics.loaded import ToolPrecision

@@ -22,9 +22,9 @@ from explorer.measures.blocks.forces import utilisations
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS
 from explorer.mechanism.pose import Triple
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_number
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
 from explorer.statics.loaded import LoadedPose
 

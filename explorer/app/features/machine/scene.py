@@ -9,9 +9,9 @@ import numpy as np
 from explorer.app.features.feature import Services, show
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
 
 # Length and radius of the axes of the tool, in scene units, and thickness of its line in pixels.

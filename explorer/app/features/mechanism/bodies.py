@@ -21,11 +21,10 @@ from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
 from explorer.legs.clearance import legs_of
 from explorer.measures.snapshot import Snapshot
+from explorer.mechanism import rgb
+from explorer.mechanism.rgb import OUTLINE, Rgb
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
-from explorer.prototype import body_colours
-from explorer.prototype.body_colours import OUTLINE
 from explorer.reproduce.six_legs import TWIN
 from explorer.singularity.colours import proximity_colour
 
@@ -63,11 +62,9 @@ class Bodies(ScenePart):
         scene = services.scene
         # Whatever is rigid with the platform has this frame as its parent.
         self._frame = scene.add_frame("/platform", show_axes=False)
-        self._base = scene.add_mesh_simple(
-            "/base/body", *shapes.NO_MESH, color=body_colours.BASE_BODY
-        )
+        self._base = scene.add_mesh_simple("/base/body", *shapes.NO_MESH, color=rgb.BASE_BODY)
         self._platform = scene.add_mesh_simple(
-            "/platform/body", *shapes.NO_MESH, color=body_colours.PLATFORM_BODY, side="double"
+            "/platform/body", *shapes.NO_MESH, color=rgb.PLATFORM_BODY, side="double"
         )
 
     def updates(self, placed: Placed) -> Updates:
@@ -147,21 +144,21 @@ class Telescopes(shapes.Rods):
 
 
 def _colours_of_parts(alarms: list[bool]) -> list[Rgb]:
-    tubes = [OUTLINE if alarm else body_colours.TUBE for alarm in alarms]
-    rods = [OUTLINE if alarm else body_colours.ROD for alarm in alarms]
-    return [*tubes, *rods, *[body_colours.JOINT] * (2 * len(alarms))]
+    tubes = [OUTLINE if alarm else rgb.TUBE for alarm in alarms]
+    rods = [OUTLINE if alarm else rgb.ROD for alarm in alarms]
+    return [*tubes, *rods, *[rgb.JOINT] * (2 * len(alarms))]
 
 
 class Legs(ScenePart):
     """The four legs with their joints, carriages and guide."""
 
     def __init__(self, services: Services) -> None:
-        scene, joint, rod = services.scene, body_colours.JOINT, body_colours.ROD
+        scene, joint, rod = services.scene, rgb.JOINT, rgb.ROD
         self._actuators = Telescopes(scene, "/legs/actuators", 4)
         # A post and two pins for each U joint, and a sleeve about the guide for each carriage.
         self._joints = shapes.Rods(scene, "/legs/joints", [joint, rod, rod] * 2 + [joint] * 2)
-        self._balls = shapes.Balls(scene, "/legs/balls", [body_colours.BALL] * 4 + [joint] * 2)
-        boxes = [body_colours.RAIL, body_colours.CARRIAGE, body_colours.CARRIAGE]
+        self._balls = shapes.Balls(scene, "/legs/balls", [rgb.BALL] * 4 + [joint] * 2)
+        boxes = [rgb.RAIL, rgb.CARRIAGE, rgb.CARRIAGE]
         self._guide = shapes.Boxes(scene, "/legs/guide", boxes)
 
     def updates(self, placed: Placed) -> Updates:
@@ -208,9 +205,9 @@ class TwinLegs(ScenePart):
     """The six legs of the 6-4 twin, which start at a1 and a2 instead of the carriages."""
 
     def __init__(self, services: Services) -> None:
-        scene, joints = services.scene, [body_colours.JOINT] * 3
+        scene, joints = services.scene, [rgb.JOINT] * 3
         self._actuators = Telescopes(scene, "/twin/actuators", len(TWIN))
-        self._balls = shapes.Balls(scene, "/twin/balls", joints + [body_colours.BALL] * 4)
+        self._balls = shapes.Balls(scene, "/twin/balls", joints + [rgb.BALL] * 4)
         self._posts = shapes.Rods(scene, "/twin/posts", joints)
 
     def updates(self, placed: Placed) -> Updates:

@@ -32,11 +32,10 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.margins import signs_of
+from explorer.mechanism.rgb import LEAVES, Rgb, css
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals
-from explorer.numerics.rgb import Rgb, css
 from explorer.page.widgets.assigning import Updates
-from explorer.prototype.body_colours import LEAVES
 from explorer.singularity.colours import FAR_WARNINGS, MARGIN_COLOURS, proximity_colour
 
 HINTS = (

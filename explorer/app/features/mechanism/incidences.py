@@ -21,12 +21,12 @@ import viser
 from explorer.app.features.feature import Services, show
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
+from explorer.mechanism import rgb
 from explorer.mechanism.margins import TETRAHEDRA
+from explorer.mechanism.rgb import Rgb, mix
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_fitted
-from explorer.numerics.rgb import Rgb, mix
 from explorer.page.widgets.assigning import Updates
-from explorer.prototype import body_colours
 from explorer.singularity import colours
 from explorer.singularity.ellipsoids import planes_of_singularity
 
@@ -221,7 +221,7 @@ class Tetrahedra(ScenePart):
         segments = shapes.dashes(corners[EDGES], stroke.most, stroke.period, stroke.drawn)
         yield edges, "visible", approach.is_shown or fails
         yield edges, "points", segments.astype(np.float32)
-        drawn = body_colours.OUTLINE if fails else colour
+        drawn = rgb.OUTLINE if fails else colour
         yield edges, "colors", shapes.of_one_colour(drawn, len(segments))
         thickness = stroke.thickness * (1.0 if approach.is_nearest else QUIET)
         thickness += FILLED_EDGE * approach.presence * approach.is_nearest

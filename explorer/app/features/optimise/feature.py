@@ -35,8 +35,8 @@ from explorer.measures.box import corners_of
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple
+from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import Unit, format_number
-from explorer.numerics.rgb import css
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
 from explorer.optimise.problem import OVER_BOX, YAW, Box, ObjectiveName, Problem
 from explorer.page.widgets.assigning import Update

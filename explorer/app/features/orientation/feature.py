@@ -28,10 +28,10 @@ from explorer.app.widgets.markup import alert, box, caption, dim, remark, row, t
 from explorer.app.widgets.under_way import UnderWay, look_of, problem
 from explorer.measures.blocks.block import Fact, Facts
 from explorer.measures.box import corners_of
+from explorer.mechanism.rgb import Rgb
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import Unit, format_decimals
-from explorer.numerics.rgb import Rgb
 from explorer.page.browser.browser_facts import decode_text
 from explorer.page.browser.viser_gaps import run_script
 from explorer.page.look import read_script

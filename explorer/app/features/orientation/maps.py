@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from explorer.app.features.orientation.work import TiltsDrawing
 from explorer.app.widgets.markup import caption, dim, reading, row, swatch, table, ticks
 from explorer.export.drawings.markup import circle, drawing_text, element, page_picture, path_of
+from explorer.mechanism.rgb import Rgb, css
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb, css
 from explorer.singularity.colours import MARGIN_COLOURS
 from explorer.workspace.orientations.tilts import GreatestTilt, TiltByTorsion, TiltMap
 

@@ -24,13 +24,12 @@ from explorer.app.widgets.markup import alert, box, caption, note, row, sentence
 from explorer.errors import ExplorerError
 from explorer.measures.box import corners_of
 from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.mechanism.rgb import BALL, CARRIAGE, OUTLINE, PLATFORM_BODY, RAIL, ROD, TUBE, Rgb
 from explorer.motion.chains import BODIES, LEGS, Places
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
 from explorer.prototype.assembly import exploded_offsets
-from explorer.prototype.body_colours import BALL, CARRIAGE, OUTLINE, PLATFORM_BODY, RAIL, ROD, TUBE
 from explorer.prototype.fitting import broken_joint_limits
 
 # Format of each file by its name on the page, and end of the name of the file.

@@ -24,9 +24,9 @@ from explorer.app.features.mechanism.marks import HANDLE_NAME
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.errors import InputError, NoAnswerError
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_apart, format_decimals, format_number
-from explorer.numerics.rgb import Rgb
 from explorer.page.browser.viser_gaps import SceneMessage, scene_as_html
 from explorer.page.look import read_script
 

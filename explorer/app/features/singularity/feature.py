@@ -31,8 +31,8 @@ from explorer.measures.blocks.source import pose_source
 from explorer.measures.verdict import DISTANCE_SHARE, warnings
 from explorer.mechanism.folds import FOLD_LINES, FOLDS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
+from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import format_decimals, format_fitted
-from explorer.numerics.rgb import css
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import shift
 from explorer.singularity import colours, strata

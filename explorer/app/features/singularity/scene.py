@@ -20,7 +20,7 @@ from explorer.measures.blocks.block import Number
 from explorer.measures.blocks.singularity import finite_gain
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.pose import Pose
-from explorer.numerics.rgb import Rgb
+from explorer.mechanism.rgb import Rgb
 from explorer.page.session.clock import Timer, now
 from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import FAR, SINGULAR, proximity_colour

@@ -21,8 +21,8 @@ from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.chips import Chips, StateCommand
 from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import TETRAHEDRA
+from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key, shift, with_keys
 from explorer.reproduce.six_legs import TWIN

@@ -16,10 +16,9 @@ from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Drawn, Shell
 from explorer.app.state.frame import Frame
 from explorer.measures.box import corners_of
 from explorer.measures.position_bands import STEP_COLOURS, UTILISATION_COLOURS
+from explorer.mechanism.rgb import OUTLINE, Rgb
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.rgb import Rgb
 from explorer.page.widgets.assigning import Updates
-from explorer.prototype.body_colours import OUTLINE
 from explorer.singularity.colours import band_colours, proximity_colour
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.faces.surfaces import Surfaces

@@ -26,8 +26,8 @@ from explorer.measures.position_bands import (
 )
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
+from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import Unit, format_number
-from explorer.numerics.rgb import css
 from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.statics.reactions import has_limits
 

@@ -1,8 +1,22 @@
-"""Colours of sRGB, channels 0 to 255."""
+"""Colours of sRGB, channels 0 to 255, and those in which bodies are drawn."""
 
 from __future__ import annotations
 
 Rgb = tuple[int, int, int]
+
+# Colour of colliding legs and bodies.
+OUTLINE: Rgb = (190, 24, 60)
+
+# Colours of bodies and of the two leaves of the folds, in the scene and in the moving page.
+TUBE: Rgb = (84, 96, 114)
+ROD: Rgb = (188, 197, 209)
+JOINT: Rgb = (52, 60, 72)
+BALL: Rgb = (232, 235, 240)
+BASE_BODY: Rgb = (214, 219, 226)
+PLATFORM_BODY: Rgb = (150, 160, 176)
+RAIL: Rgb = (128, 138, 152)
+CARRIAGE: Rgb = (104, 115, 132)
+LEAVES: tuple[Rgb, Rgb] = ((176, 156, 112), (96, 140, 136))
 
 
 def css(colour: Rgb) -> str:
