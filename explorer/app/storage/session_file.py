@@ -168,9 +168,9 @@ def encode_session(history: History) -> bytes:
         StorageError: A number in it is not finite.
     """
     start = max(0, min(len(history.steps) - MOST_STEPS, history.at - MOST_STEPS // 2))
-    steps, before = list[_Step](), dict[str, Any]()
+    steps, before, paths = list[_Step](), dict[str, Any](), [*_kinds()]
     for step in history.steps[start : start + MOST_STEPS]:
-        values = _values_of(step.state)
+        values = {path: value_at(step.state, path) for path in paths}
         changes = {
             path: _saved(value)
             for path, value in values.items()
@@ -221,10 +221,6 @@ def _kinds() -> dict[str, Any]:
         hints = get_type_hints(kind)
         found |= {f"{name}.{field.name}": hints[field.name] for field in saved_fields(kind)}
     return found
-
-
-def _values_of(state: State) -> dict[str, Any]:
-    return {path: value_at(state, path) for path in _kinds()}
 
 
 def _state_of(values: dict[str, Any]) -> State:
