@@ -183,8 +183,9 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         struts: Tubes of legs 2 and 3.
         guide: Limits of the guide.
         tolerances: Tolerances of the geometric dimensions.
-        required_box: (lows, highs) of the positions of b4 that a search required of the workspace,
-            where it found them; None for none. It is no limit.
+        required_box: (lows, highs) of the box of positions of the tool that was required of the
+            design, before it is turned; None for none. It is no limit.
+        required_yaw: Angle about z, in degrees, by which that box is turned about its centre.
 
     Raises:
         DesignError: A value is not finite or beyond the bounds of
@@ -210,6 +211,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     guide: Guide = Guide()
     tolerances: Tolerances = Tolerances()
     required_box: tuple[Triple, Triple] | None = None
+    required_yaw: float = 0.0
 
     def __post_init__(self) -> None:
         if self.schema != 2:
@@ -229,6 +231,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             _set(self, "node_step", checks.positive("node_step", self.node_step))
         if self.required_box is not None:
             _set(self, "required_box", checks.box("required_box", self.required_box))
+        _set(self, "required_yaw", checks.number("required_yaw", self.required_yaw))
         size = checks.number(
             "the largest design variable", max(map(abs, self.variables)), checks.LEAST
         )

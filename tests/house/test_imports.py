@@ -35,6 +35,7 @@ ROOMS = (
     "prototype",
     "paths",
     "optimise",
+    "find",
     "sweep",
     "reproduce",
     "export",

@@ -1,0 +1,1 @@
+"""Requirements, and machines that keep them."""
