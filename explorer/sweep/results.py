@@ -22,11 +22,10 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.number_text import UNITS, Unit
-from explorer.optimise.outcome import GOALS
 from explorer.optimise.problem import YAW
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.parts import pyarrow, sound_parts, stray_paths, words_of_paths
-from explorer.sweep.rows import SAMPLE, Kind, Value, columns_of, design_of
+from explorer.sweep.rows import Kind, Value, columns_of, design_of
 from explorer.sweep.study import NAMES, Objective, Study
 
 
@@ -102,7 +101,7 @@ class Results:
         if not 0 <= row < self.count:
             raise InputError(f"the row must lie within 0 to {self.count - 1}; got {row}")
         study, index = self.study, int(self.columns["index"][row])
-        values = {name: float(self.columns[name][row]) for name in study.varied}
+        values = {name: float(self.columns[name][row]) for name in study.variables}
         return design_of(study, values, f"{study.name[:80]} #{index}")
 
     def design_at(self, index: int) -> Design:
@@ -183,12 +182,9 @@ def csv_bytes(results: Results, lengths: Unit) -> bytes:
     Raises:
         MissingExtraError: Pyarrow is not installed.
     """
-    polish, columns = results.study.polish, dict[str, Column]()
-    # F = |1 − V / V′| is a plain number.
-    goals: dict[str, str] = {**GOALS, "match-volume": ""}
-    goal = "" if polish is None else goals[polish.objective]
+    columns = dict[str, Column]()
     for name, values in results.columns.items():
-        unit = unit_of(goal if name == "objective" else name.removeprefix(SAMPLE), lengths)
+        unit = unit_of(name, lengths)
         columns[unit.head(name)] = values if unit.factor == 1.0 else unit.factor * values
     (csv,) = load_extra("study", "pyarrow.csv")
     return _table_bytes(columns, csv.write_csv)

@@ -25,24 +25,18 @@ from explorer.measures.measure import Case
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.optimise.problem import YAW, Problem, Variable, start_value, with_strokes, with_values
+from explorer.optimise.problem import with_values
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.study import RADIUS, Study, decode_study
 
-Kind = Literal["int64", "float64", "bool", "string"]
+Kind = Literal["int64", "float64", "string"]
 """Name of the type of a column in a file."""
 
-Value: TypeAlias = float | int | bool | str | None
+Value: TypeAlias = float | int | str | None
 """Value of a row; None where there is none."""
 
 # Number of designs tried before a study is refused because none of them can be made.
 MOST_TRIED = 256
-
-# Rounding error of an angle, in turns.
-ROUNDING = 1e-12
-
-SAMPLE = "sample_"
-"""Prefix of the columns with the start of a search."""
 
 
 @dataclass(frozen=True)
@@ -63,17 +57,12 @@ class Rows:
 def columns_of(study: Study) -> dict[str, Kind]:
     """Return the columns of a study's rows by name, in their order.
 
-    The status is "done" (all is measured), "not converged" (the search did not meet all demands;
-    its best is measured), "empty workspace" (only the design itself is measured), "invalid
-    design" (the variables make none), "failed" (an error that is not the design's) or "worker
-    died" (each process that tried it died).
+    The status is "done" (all is measured), "empty workspace" (only the design itself is measured),
+    "invalid design" (the variables make none), "failed" (an error that is not the design's) or
+    "worker died" (each process that tried it died).
     """
     columns: dict[str, Kind] = {"index": "int64"}
-    if study.polish is not None:
-        columns.update((f"{SAMPLE}{name}", "float64") for name in study.variables)
-    columns.update((name, "float64") for name in (*study.varied, *study.measures))
-    if study.polish is not None:
-        columns.update(objective="float64", iterations="int64", converged="bool")
+    columns.update((name, "float64") for name in (*study.variables, *study.measures))
     columns.update(status="string", reason="string")
     return columns
 
@@ -95,7 +84,7 @@ def rows_of_dead_workers(study: Study, indices: range, reason: str) -> Rows:
     rows: list[dict[str, Value]] = []
     for index, row in zip(indices, samples(study, indices).tolist(), strict=True):
         sample = dict(zip(study.variables, row, strict=True))
-        rows.append(_start_row(study, index, sample) | {"status": "worker died", "reason": reason})
+        rows.append({"index": index, **sample, "status": "worker died", "reason": reason})
     return _as_columns(study, indices, rows)
 
 
@@ -110,56 +99,11 @@ def design_of(study: Study, values: Mapping[str, float], name: str | None = None
     for variable, number in values.items():
         if variable in MACHINE:
             design = MACHINE[variable].with_value(design, number)
-    if study.polish is not None:
-        design = with_strokes(design, study.polish.demands.stroke_ratio)
     return design if name is None else msgspec.structs.replace(design, name=name)
 
 
-def problem_of(study: Study, sample: Mapping[str, float]) -> Problem:
-    """Return the problem that is solved from a sample.
-
-    Raises:
-        InputError: The sample makes no design, or one that the problem does not allow.
-    """
-    if study.polish is None:
-        raise InputError("this study polishes nothing")
-    unpolished = msgspec.structs.replace(study, polish=None)
-    start = design_of(unpolished, sample)
-    variables: list[Variable] = []
-    for name in study.polished:
-        value = start_value(start, name)
-        turns = _turns(study, sample, value) if name == YAW else 0.0
-        low, high = (end - turns for end in _bounds(study, sample, name))
-        # An angle that has been through a quaternion may leave its range by rounding.
-        ends = (low, high, value) if name in study.variables else (low, high)
-        variables.append(Variable(name, min(ends), max(ends)))
-    return Problem(
-        start=start,
-        objective=study.polish.objective,
-        variables=tuple(variables),
-        demands=study.polish.demands,
-    )
-
-
-def _bounds(study: Study, sample: Mapping[str, float], name: str) -> tuple[float, float]:
-    """Return the bounds of a variable in a search: its range, extended to the start."""
-    low, high = study.polished[name]
-    start = sample.get(name, low)
-    return min(low, start), max(high, start)
-
-
-def _turns(study: Study, sample: Mapping[str, float], yaw: float) -> float:
-    """Return the turns, in degrees, from a start's yaw, which is within ±180°, to the study's.
-
-    The study's 190° is a rotation's −170°.
-    """
-    if YAW in sample:
-        return 360.0 * round((sample[YAW] - yaw) / 360.0)
-    return 360.0 * math.ceil((study.polished[YAW][0] - yaw) / 360.0 - ROUNDING)
-
-
 def check_study(study: Study) -> None:
-    """Check that some of many designs of a study can be made or polished, and have its measures.
+    """Check that some of many designs of a study can be made, and have its measures.
 
     The user then reads at once what is wrong with all of them, rather than in every row.
 
@@ -178,10 +122,7 @@ def check_study(study: Study) -> None:
         row = samples(study, range(index, index + 1))[0]
         sample = dict(zip(study.variables, row.tolist(), strict=True))
         try:
-            if study.polish is None:
-                design = design_of(study, sample)
-            else:
-                design = problem_of(study, sample).start
+            design = design_of(study, sample)
         except InputError as error:
             first = first or error
             continue
@@ -198,7 +139,6 @@ def check_study(study: Study) -> None:
 def load_kernels(study: Study) -> None:
     """Import all kernels that the rows of a study may need."""
     for is_needed, module in (
-        (study.polish is not None, "explorer.optimise.solver"),
         ("accessible_volume" in study.measures, "explorer.workspace.accessible.workspace"),
         ("held_volume" in study.measures, "explorer.workspace.carried_region"),
     ):
@@ -217,7 +157,7 @@ def _decode_study(study: bytes) -> Study:
 
 
 def _row(study: Study, index: int, sample: dict[str, float]) -> dict[str, Value]:
-    row = _start_row(study, index, sample)
+    row: dict[str, Value] = {"index": index, **sample}
     try:
         _measure(study, sample, row)
     except DesignError as error:
@@ -229,43 +169,10 @@ def _row(study: Study, index: int, sample: dict[str, float]) -> dict[str, Value]
     return row
 
 
-def _start_row(study: Study, index: int, sample: Mapping[str, float]) -> dict[str, Value]:
-    """Return a row with its index and its sample only."""
-    row: dict[str, Value] = {"index": index, **sample}
-    if study.polish is not None:
-        row |= {f"{SAMPLE}{name}": value for name, value in sample.items()}
-        missing = [name for name in study.varied if name not in sample]
-        row |= {name: start_value(study.base, name) for name in missing}
-    return row
-
-
 def _measure(study: Study, sample: dict[str, float], row: dict[str, Value]) -> None:
     """Write the values, the status and the reason of a design into its row."""
     status, reason = "done", ""
-    values = sample
-    if study.polish is not None:
-        from explorer.optimise.solver import optimise_design
-
-        problem = problem_of(study, sample)
-        outcome = optimise_design(problem, iterations=study.polish.iterations)
-        ends = dict(zip(problem.names, outcome.best.values, strict=True))
-        if YAW in ends:
-            ends[YAW] += _turns(study, sample, start_value(problem.start, YAW))
-        for name, value in ends.items():
-            low, high = _bounds(study, sample, name)
-            # Only rounding takes a value out of its bounds.
-            ends[name] = min(max(value, low), high)
-        values = {**sample, **ends}
-        row |= {
-            **ends,
-            "objective": outcome.best.objective,
-            "iterations": outcome.iterations,
-            "converged": outcome.converged,
-        }
-        if not outcome.converged:
-            # A message begins with how the search ended, which the status may say already.
-            status, reason = "not converged", outcome.message.removeprefix("not converged: ")
-    design = design_of(study, values)
+    design = design_of(study, sample)
     case = Case(design, study.nodes, study.clearance_margin)
     if case.volume.volume <= 0.0 and status == "done":
         because = ", ".join(case.volume.empty_because)

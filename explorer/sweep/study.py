@@ -34,10 +34,7 @@ Sense = Literal["min", "max"]
 
 RADIUS = "radius"
 
-POLISHED = (*VARIABLES, problems.YAW, problems.REACH)
-"""The variables that the optimiser can change."""
-
-NAMES = (*POLISHED, RADIUS, *MACHINE)
+NAMES = (*VARIABLES, problems.YAW, problems.REACH, RADIUS, *MACHINE)
 """The variables of a study: those of X, the yaw of home in degrees, one maximum for all four
 lengths, one radius for all four legs, and those of the machine."""
 
@@ -46,7 +43,6 @@ MOST_DESIGNS = 2**30
 # A hypercube is made as a whole, in each process.
 MOST_IN_HYPERCUBE = 1_000_000
 MOST_IN_CHUNK = 100_000
-MOST_ITERATIONS = 100_000
 LARGEST_SEED = 2**31 - 1
 
 DEFAULT_MEASURES = ("volume", "reach", "worst_margin", "clearance", "inverse_condition")
@@ -90,34 +86,6 @@ class Sampling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
             _set(self, "count", whole("sampling.count", self.count, 1, MOST_DESIGNS))
 
 
-class Polish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A search for the optimum from each sample, see `explorer.optimise`.
-
-    Attributes:
-        objective: Objective of the search.
-        demands: Demands of the search.
-        variables: Bounds of the variables of the search by name; None for the variables of the
-            study within their ranges, without the radius.
-        iterations: Most steps of each search.
-
-    Raises:
-        InputError: An unknown objective or variable, an empty range, no iterations.
-    """
-
-    objective: problems.ObjectiveName
-    demands: problems.Demands = problems.Demands()
-    variables: dict[str, Pair] | None = None
-    iterations: int = 100
-
-    def __post_init__(self) -> None:
-        _set(self, "objective", one_of("polish.objective", self.objective, problems.OBJECTIVES))
-        iterations = whole("polish.iterations", self.iterations, 1, MOST_ITERATIONS)
-        _set(self, "iterations", iterations)
-        if self.variables is not None:
-            ranges = _ranges("polish.variables", self.variables, POLISHED)
-            _set(self, "variables", ranges)
-
-
 class Objective(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A measure or variable that is to be small or large.
 
@@ -151,7 +119,6 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         nodes: Nodes on each axis of the grid for margins and clearances.
         clearance_margin: Least |δ| at which clearances count, in design units; None for a 20th
             of the design's reach.
-        polish: Search from each sample, whose result is measured; or None.
         objectives: Objectives of the Pareto front.
         chunk: Number of designs of one task and one part of the results.
 
@@ -167,7 +134,6 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     measures: tuple[str, ...] = DEFAULT_MEASURES
     nodes: int = DEFAULT_NODES
     clearance_margin: float | None = None
-    polish: Polish | None = None
     objectives: tuple[Objective, ...] = ()
     chunk: int = 64
 
@@ -175,7 +141,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         _set(self, "schema", whole("schema", self.schema, 1, 1))
         _set(self, "name", title("name", self.name))
         _set(self, "design", _complete(self.design))
-        _set(self, "variables", _ranges("variables", self.variables, NAMES))
+        _set(self, "variables", _ranges(self.variables))
         _set(self, "measures", tuple(map(str, self.measures)))
         self._check_ranges()
         self._check_sampling()
@@ -186,10 +152,10 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         _set(self, "chunk", whole("chunk", self.chunk, 1, MOST_IN_CHUNK))
         _set(self, "objectives", tuple(self.objectives))
         for objective in self.objectives:
-            if objective.measure not in (*self.varied, *self.measures):
+            if objective.measure not in (*self.variables, *self.measures):
                 raise InputError(
                     f"the objective {objective.measure!r} is neither measured nor a variable of "
-                    f"the study; there are {', '.join((*self.varied, *self.measures))}"
+                    f"the study; there are {', '.join((*self.variables, *self.measures))}"
                 )
         _check_unique("objectives", [objective.measure for objective in self.objectives])
 
@@ -197,20 +163,6 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     def base(self) -> Design:
         """The design that is varied, with its home pose."""
         return cast("Design", self.design)
-
-    @property
-    def polished(self) -> Mapping[str, Pair]:
-        """Bounds of the variables of the searches; empty without any."""
-        if self.polish is None:
-            return {}
-        if self.polish.variables is not None:
-            return self.polish.variables
-        return {name: ends for name, ends in self.variables.items() if name in POLISHED}
-
-    @property
-    def varied(self) -> tuple[str, ...]:
-        """Variables in which the designs differ, in the order of their columns."""
-        return tuple(dict.fromkeys((*self.variables, *self.polished)))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -274,7 +226,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         for name in self.measures:
             if name not in known:
                 raise InputError(f"no measure {name!r}; there are {', '.join(known)}")
-            if name in self.varied:
+            if name in self.variables:
                 raise InputError(f"{name} is a variable of the study: leave it out of the measures")
 
 
@@ -328,15 +280,13 @@ def _complete(design: Any) -> Design:
     return msgspec.structs.replace(design, home=design.home_pose)
 
 
-def _ranges(
-    field: str, given: Mapping[str, Pair], known: tuple[str, ...]
-) -> dict[str, tuple[float, float]]:
+def _ranges(given: Mapping[str, Pair]) -> dict[str, tuple[float, float]]:
     if not given:
-        raise InputError(f"{field} must name at least one of {', '.join(known)}")
+        raise InputError(f"variables must name at least one of {', '.join(NAMES)}")
     ranges: dict[str, tuple[float, float]] = {}
     for name, ends in given.items():
-        if name not in known:
-            raise InputError(f"{field}: no variable {name!r}; there are {', '.join(known)}")
+        if name not in NAMES:
+            raise InputError(f"variables: no variable {name!r}; there are {', '.join(NAMES)}")
         first, last = two(f"the range of {name}", ends)
         low, high = number(f"the low end of {name}", first), number(f"the high end of {name}", last)
         if not low < high:

@@ -38,7 +38,6 @@ STUDY_FIELDS: dict[str, Any] = {
     "variables": {"a3x": [9, 10], "a3y": [4, 5], "reach": [30, 40]},
     "sampling": {"method": "grid", "count": {"a3x": 2, "a3y": 3, "reach": 2}},
     "measures": ["volume"],
-    "polish": {"objective": "largest-volume", "variables": {"b2": [1, 2]}},
     "objectives": [{"measure": "volume", "sense": "max"}, {"measure": "a3x", "sense": "min"}],
 }
 ENCODINGS = {
@@ -258,14 +257,13 @@ def test_unusable_value_is_reported_with_its_line(field: str, words: str) -> Non
 def test_unusable_range_of_a_study_is_reported_with_its_line() -> None:
     for path, value in (
         (("variables", "a3y"), [7, 6]),
-        (("polish", "variables", "b2"), [7, 6]),
         (("sampling", "count", "a3y"), 0),
         (("design", "limits", "gap"), -1),
         (("design", "unit_mm"), 0),
-        (("polish", "iterations"), 0),
+        (("nodes",), 0),
     ):
         fields = copy.deepcopy(STUDY_FIELDS)
-        fields["polish"]["iterations"] = 10
+        fields["nodes"] = 10
         text = json.dumps(with_value(fields, path, value), indent=1)
         broken = json.dumps(with_value(fields, path, MARK), indent=1)
         message = refusal(decode_study, text.encode(), "mine.json")

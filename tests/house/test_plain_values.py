@@ -14,8 +14,8 @@ from hypothesis import given, strategies as st
 from explorer import PRESETS, Design, InputError, Pose
 from explorer.mechanism.design import Swing
 from explorer.mechanism.design_file import decode_design, encode_design
-from explorer.optimise.problem import OBJECTIVES, Demands, Problem, Variable
-from explorer.sweep.study import Objective, Polish, Sampling, Study, decode_study, encode_study
+from explorer.optimise.problem import Demands, Problem, Variable
+from explorer.sweep.study import Objective, Sampling, Study, decode_study, encode_study
 
 OPTIMAL = PRESETS["paper-optimal"]
 BOX = ((8.0, 3.0, 6.0), (12.0, 7.0, 10.0))
@@ -36,9 +36,6 @@ STUDY = Study(
     measures=("volume", "reach"),
     nodes=9,
     clearance_margin=0.5,
-    polish=Polish(
-        objective=OBJECTIVES[0], demands=Demands(volume=1.0), variables={"b2": (1.0, 3.0)}
-    ),
     objectives=(Objective("volume", "max"),),
     chunk=4,
 )

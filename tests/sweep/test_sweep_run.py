@@ -38,7 +38,7 @@ from explorer.sweep.parts import LOCK_FILE, part_path, part_paths, read_part
 from explorer.sweep.results import Results, csv_bytes, front, load_results, parquet_bytes, summarise
 from explorer.sweep.rows import columns_of, samples
 from explorer.sweep.run import Progress, RunError, run_study
-from explorer.sweep.study import Objective, Polish, Sampling, Study, encode_study
+from explorer.sweep.study import Objective, Sampling, Study, encode_study
 from explorer.sweep.workers import LocalWorkers
 
 STUDY = Study(
@@ -123,13 +123,11 @@ def test_missing_values_are_null_in_files_and_nan_in_columns(tmp_path: Path) -> 
         STUDY,
         variables={"b1y": (-1.0, 1.0)},
         sampling=Sampling(method="grid", count=3),
-        polish=Polish(objective="largest-volume", iterations=2),
     )
     run_study(study, tmp_path, HereWorkers())
     results = load_results(tmp_path)
     assert results.columns["status"][1] == "invalid design"
-    for name in ("volume", "iterations", "converged", "objective"):
-        assert np.isnan(results.columns[name]).tolist() == [False, True, False]
+    assert np.isnan(results.columns["volume"]).tolist() == [False, True, False]
     polars: Any = importlib.import_module("polars")
     assert polars.read_parquet(tmp_path)["volume"].null_count() == 1
     with pytest.raises(InputError, match="degenerate"):
@@ -306,34 +304,30 @@ def test_table_of_results_has_the_value_of_each_row_and_column(whole: Path, name
 def test_csv_of_results_has_the_unit_of_each_column_in_its_header(lengths: Unit) -> None:
     polars: Any = importlib.import_module("polars")
     ranges = dict.fromkeys(("yaw", "b2", "radius", "tool_x", "payload_mass"), (1.0, 3.0))
-    polished = {"yaw": (1.0, 3.0), "b2": (1.0, 3.0)}
     study = msgspec.structs.replace(
         STUDY,
         variables=ranges,
         measures=("volume", "home_worst_turn", "inverse_condition"),
         objectives=(),
-        polish=Polish(objective="smallest-reach", variables=polished),
     )
     kinds = columns_of(study)
     columns = {name: np.array([2.0 if kind == "float64" else 1]) for name, kind in kinds.items()}
     table = polars.read_csv(io.BytesIO(csv_bytes(Results(study, columns), lengths)))
     unit, size = lengths.name, 2.0 * lengths.factor
-    of_lengths = ("sample_b2", "sample_radius", "sample_tool_x", "b2", "radius", "tool_x")
+    of_lengths = ("b2", "radius", "tool_x")
     volume = lengths.to_power(3, math.inf)
     expected = {
-        **{f"{name} [{unit}]": size for name in (*of_lengths, "objective")},
+        **{f"{name} [{unit}]": size for name in of_lengths},
         f"volume [{volume.name}]": 2.0 * volume.factor,
-        **dict.fromkeys(("sample_yaw [°]", "yaw [°]", "home_worst_turn [°]"), 2.0),
-        **dict.fromkeys(("sample_payload_mass [kg]", "payload_mass [kg]"), 2.0),
+        **dict.fromkeys(("yaw [°]", "home_worst_turn [°]"), 2.0),
+        "payload_mass [kg]": 2.0,
         "inverse_condition": 2.0,
     }
     names = [name.partition(" [")[0] for name in table.columns]
     assert names == [*kinds]
     found = {name: table[name][0] for name in table.columns}
     assert {name: found[name] for name in expected} == pytest.approx(expected)
-    assert found.keys() - expected.keys() == {
-        *("index", "iterations", "converged", "status", "reason")
-    }
+    assert found.keys() - expected.keys() == {"index", "status", "reason"}
 
 
 def test_folder_in_use_is_refused(tmp_path: Path) -> None:

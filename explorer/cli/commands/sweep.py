@@ -193,7 +193,7 @@ def summary_lines(summary: results.Summary) -> Iterator[str]:
     yield f"Pareto front ({objectives}): {len(summary.front)} designs"
     if summary.incomparable:
         yield f"without a value of an objective, so not in the front: {summary.incomparable}"
-    names = [*dict.fromkeys([*(goal.measure for goal in study.objectives), *study.varied])]
+    names = [*dict.fromkeys([*(goal.measure for goal in study.objectives), *study.variables])]
     step = max(1.0, (len(summary.front) - 1) / (SHOWN - 1))
     rows = [summary.front[round(k * step)] for k in range(min(SHOWN, len(summary.front)))]
     if rows:

@@ -32,9 +32,6 @@ MOST_ROWS: dict[PlotName, int] = {"lines": 500, "points": 2000}
 """Largest number of designs in each plot; of more, the front and some of the others. More would
 cover one another."""
 
-# Statuses of designs that have measures.
-MEASURED = ("done", "not converged")
-
 # Least spread of an axis as a share of the size of its values; one with less is left out.
 NO_SPREAD = 1e-9
 
@@ -152,17 +149,17 @@ def select_rows(
     `front` tells of each row whether it is on the Pareto front, shape (n,).
     """
     columns, study = results.columns, results.study
-    is_measured = np.isin(columns["status"].astype(str), MEASURED)
+    is_measured = columns["status"] == "done"
     has_value = {
         name: is_measured & np.isfinite(np.asarray(columns[name], dtype=np.float64))
-        for name in (*study.varied, *study.measures)
+        for name in (*study.variables, *study.measures)
     }
     axes = tuple(name for name, rows in has_value.items() if _has_spread(columns[name][rows]))
     if len(axes) < 2:
         return None
     # Without a choice: the first objectives, then measures, then variables.
     objectives = [objective.measure for objective in study.objectives]
-    order = dict.fromkeys((*objectives, *study.measures, *study.varied))
+    order = dict.fromkeys((*objectives, *study.measures, *study.variables))
     first, second = [name for name in order if name in axes][:2]
     across = studies.across if studies.across in axes else first
     up = studies.up if studies.up in axes else second

@@ -85,7 +85,7 @@ def _summary(study: Study) -> str:
     return " · ".join(
         (
             f"objectives: {objectives}" if objectives else "no objectives",
-            f"varied: {', '.join(map(label_of, study.varied))}",
+            f"varied: {', '.join(map(label_of, study.variables))}",
             f"1 unit = {format_number(study.base.unit_mm, 6)} mm",
         )
     )
@@ -198,7 +198,7 @@ def table(drawing: StudyDrawing) -> str:
     if not len(rows):
         return ""
     objectives = [objective.measure for objective in study.objectives]
-    names = tuple(dict.fromkeys((*objectives, *study.varied)))[:MOST_COLUMNS]
+    names = tuple(dict.fromkeys((*objectives, *study.variables)))[:MOST_COLUMNS]
     units = {name: unit_of(name, drawing.lengths) for name in names}
     head = "".join(
         f'<span title="{escape(_hint(name, drawing.lengths))}">'
