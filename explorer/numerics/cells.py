@@ -46,6 +46,10 @@ def largest_values(
     lows: FloatArray,
     highs: FloatArray,
     enough: float = 0.0,
+    most: int = MOST,
+    scales: FloatArray | None = None,
+    *,
+    resolves: bool = True,
 ) -> CellValues:
     """Return the largest values of m functions over a box, without the axis of the cells.
 
@@ -58,12 +62,20 @@ def largest_values(
         enough: Level up to which no value is resolved: the search only proves that none is above
             it. Above, it ends where the bound exceeds the level by little more than the largest
             value does.
+        most: Largest number of cells.
+        scales: Weights of the axes, shape (k,): the longest edge alone is halved at a time; None to
+            halve all.
+        resolves: Whether cells are divided for values above the level, too.
     """
     size = highs - lows
-    halves = np.array([*itertools.product(*((0.0, 0.5) if each else (0.0,) for each in size))])
-    low, left, found = lows[None], MOST, None
+    low, left, found = lows[None], most, None
     while found is None or len(low):
-        low, size = (low[:, None] + size * halves).reshape(-1, len(size)), 0.5 * size
+        divided = size > 0.0
+        if scales is not None:
+            divided &= np.arange(len(size)) == (size * scales).argmax()
+        halves = np.array([*itertools.product(*((0.0, 0.5) if each else (0.0,) for each in divided))])
+        low = (low[:, None] + size * halves).reshape(-1, len(size))
+        size = np.where(divided, 0.5 * size, size)
         parts = np.array_split(low, 1 + len(low) // BATCH)
         measured = [measure(part, np.minimum(part + size, highs)) for part in parts]
         cells = CellValues(*map(np.concatenate, zip(*measured, strict=True)))
@@ -75,6 +87,8 @@ def largest_values(
             best = np.where(is_old, found.values, best)
             places = np.where(is_old[:, None], found.places, places)
         least = enough + (1.0 + LOOSE) * np.maximum(best - enough, 0.0)
+        if not resolves:
+            least[best > enough] = np.inf
         divides, left = np.any(cells.bounds > least, axis=1), left - len(low)
         divides &= size.any() and len(halves) * np.count_nonzero(divides) <= left
         bounds = np.where(divides[:, None], -np.inf, cells.bounds).max(axis=0)

@@ -1,0 +1,262 @@
+"""Values of machines in poses, for arrays of machines and of poses at once.
+
+A machine is a row of numbers, `VARIABLES`, with lengths over the diagonal of the required box; a
+pose is a place in the box with a tilt. All formulas are analytic in the variables, so that complex
+numbers pass through them: with an imaginary step far below rounding the imaginary part of a result
+over that step is its derivative, to the last digits (W. Squire and G. Trapp, "Using complex
+variables to estimate derivatives of real functions", 1998).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from explorer.legs.clearance import PAIRS
+from explorer.numerics.arrays import FloatArray
+
+Vec = tuple[Any, Any, Any]
+"""The x, y and z of vectors, arrays or numbers."""
+
+VARIABLES = (
+    *("a3x", "a3y", "b1x", "b1y", "b2", "b3"),
+    *("home x", "home y", "home z"),
+    "yaw of the box",
+    *("yaw", "pitch", "roll"),
+    *("tool x", "tool y", "tool z"),
+    *("tilt", "size of the box"),
+)
+"""The variables: those of a design; the tool at home, which is the centre of the box; angles of the
+box and of home in radians; the tool in the platform; factors on all tilts and on the box."""
+
+A3X, A3Y, B1X, B1Y, B2, B3, HX, HY, HZ, BOX_YAW, YAW, PITCH, ROLL, TX, TY, TZ, TILT, SIZE = range(
+    len(VARIABLES)
+)
+
+
+class BoxPoses(NamedTuple):
+    """Poses over a required box.
+
+    Attributes:
+        places: Places in the box, from −1 to 1 along each of its edges, shape (k, 3).
+        tilts: Vectors of the turns in the base plane, in radians, shape (k, 2).
+    """
+
+    places: FloatArray
+    tilts: FloatArray
+
+    def plus(self, other: BoxPoses) -> BoxPoses:
+        """Return the poses of both."""
+        return BoxPoses(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+
+    def at(self, rows: Any) -> BoxPoses:
+        """Return some of the poses."""
+        return BoxPoses(self.places[rows], self.tilts[rows])
+
+
+HOME = BoxPoses(np.zeros((1, 3)), np.zeros((1, 2)))
+
+
+def plus(a: Vec, b: Vec) -> Vec:
+    """Return a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def minus(a: Vec, b: Vec) -> Vec:
+    """Return a − b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def times(s: Any, a: Vec) -> Vec:
+    """Return s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+def dot(a: Vec, b: Vec) -> Any:
+    """Return a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vec, b: Vec) -> Vec:
+    """Return a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def norm(a: Vec) -> Any:
+    """Return |a|, analytic where it is not zero."""
+    return np.sqrt(dot(a, a))
+
+
+class MachineValues:
+    """The values of machines x (..., n) in k poses over a box, arrays (..., k), computed when used.
+
+    The edges of the box (3,) are over its diagonal, as all lengths are.
+    """
+
+    def __init__(self, x: FloatArray, edges: FloatArray, poses: BoxPoses) -> None:
+        self.poses, self.x = poses, [column[..., None] for column in np.moveaxis(x, -1, 0)]
+        x = self.x
+        along = (0.5 * edges * poses.places).T
+        c, s = np.cos(x[BOX_YAW]), np.sin(x[BOX_YAW])
+        offset: Vec = along[0] * c - along[1] * s, along[0] * s + along[1] * c, along[2]
+        self.tool = plus((x[HX], x[HY], x[HZ]), times(x[SIZE], offset))
+        size = np.sqrt((poses.tilts**2).sum(axis=-1))
+        azimuth = np.divide(
+            poses.tilts.T, size, out=np.zeros_like(poses.tilts.T), where=size > 0.0
+        )
+        self._axis: Vec = azimuth[0], azimuth[1], 0.0
+        self._cos, self._sin = np.cos(x[TILT] * size), np.sin(x[TILT] * size)
+        self.home_axes = _axes(x)
+        self.u, self.v, self.w = map(self._tilted, self.home_axes)
+        self.p = minus(self.tool, self._of_platform((x[TX], x[TY], x[TZ])))
+
+    def _tilted(self, a: Vec) -> Vec:
+        n = self._axis
+        part = (1.0 - self._cos) * (n[0] * a[0] + n[1] * a[1])
+        around = n[1] * a[2], -n[0] * a[2], n[0] * a[1] - n[1] * a[0]
+        turned = plus(times(self._cos, a), times(self._sin, around))
+        return turned[0] + part * n[0], turned[1] + part * n[1], turned[2]
+
+    def _of_platform(self, a: Vec) -> Vec:
+        return plus(plus(times(a[0], self.u), times(a[1], self.v)), times(a[2], self.w))
+
+    @cached_property
+    def ends(self) -> list[Vec]:
+        """Platform ends of the four legs."""
+        x, p = self.x, self.p
+        b1 = plus(p, plus(times(x[B1X], self.u), times(x[B1Y], self.v)))
+        return [b1, plus(p, times(x[B2], self.u)), plus(p, times(x[B3], self.u)), p]
+
+    @cached_property
+    def legs(self) -> list[Vec]:
+        """The four legs from base to platform."""
+        b1, b2, b3, p = self.ends
+        still = 0.0 * p[0]
+        leg4 = p[0] - self.x[A3X], p[1] - self.x[A3Y], p[2]
+        return [b1, (still, b2[1], b2[2]), (still, b3[1], b3[2]), leg4]
+
+    @cached_property
+    def lengths(self) -> list[Any]:
+        """The lengths of the four legs."""
+        return [norm(leg) for leg in self.legs]
+
+    @cached_property
+    def margins(self) -> list[Any]:
+        """The margins δ1, δ2 and δ3."""
+        p, u, w = self.p, self.u, self.w
+        return [-dot(w, p), u[1] * p[2] - u[2] * p[1], p[2]]
+
+    @property
+    def order(self) -> Any:
+        """The distance d3 − d1 of the carriages with its sign."""
+        return (self.x[B3] - self.x[B2]) * self.u[0]
+
+    def swings(self, home: MachineValues) -> list[Any]:
+        """Return the cosines of the legs' angles from home in the joints a1, a3, b1 to b4."""
+        found = [dot(self.legs[i], home.legs[i]) for i in (0, 3)]
+        norms = [self.lengths[i] * home.lengths[i] for i in range(4)]
+        cosines = [found[0] / norms[0], found[1] / norms[3]]
+        axes, own = (self.u, self.v, self.w), self.home_axes
+        for leg, at_home, size in zip(self.legs, home.legs, norms, strict=True):
+            parts = [dot(axis, leg) * dot(mine, at_home) for axis, mine in zip(axes, own, strict=True)]
+            cosines.append((parts[0] + parts[1] + parts[2]) / size)
+        return cosines
+
+    @cached_property
+    def distances(self) -> list[Any]:
+        """The distances of the axes of the six pairs of legs, in the order of `PAIRS`."""
+        base = [minus(end, leg) for end, leg in zip(self.ends, self.legs, strict=True)]
+        return [
+            _distance(base[i - 1], self.legs[i - 1], base[j - 1], self.legs[j - 1])
+            for i, j in PAIRS
+        ]
+
+    def forces(self, force: Vec, moment: Vec) -> list[Any]:
+        """Return the actuators' forces that hold a wrench about b4, in the order of the joints.
+
+        The closed form is that of `explorer.motion.inverse_jacobian`.
+        """
+        x, p, u = self.x, self.p, self.u
+        d1, d2, d3 = self.margins
+        leg1, _, _, leg4 = self.legs
+        f1 = dot(moment, u) / (x[B1Y] * d1)
+        f4 = -(moment[0] + p[1] * force[2] - p[2] * force[1]) / (x[A3Y] * d3)
+        rest = plus(plus(force, times(f1, leg1)), times(f4, leg4))
+        turning = plus(moment, times(f1, cross(minus(leg1, p), leg1)))
+        lever = cross(u, rest)
+        held: list[Vec] = []
+        for own, other, side in ((self.ends[1], x[B3], 1.0), (self.ends[2], x[B2], -1.0)):
+            across = cross(minus(turning, times(other, lever)), u)
+            q = times(side / (x[B3] - x[B2]), across)
+            held.append(plus(q, times((own[1] * q[2] - own[2] * q[1]) / d2, u)))
+        struts = [
+            (end[1] * h[1] + end[2] * h[2]) / length
+            for end, h, length in zip(self.ends[1:3], held, self.lengths[1:3], strict=True)
+        ]
+        l1, l4 = self.lengths[0], self.lengths[3]
+        return [f1 * l1, held[0][0], struts[0], held[1][0], struts[1], f4 * l4]
+
+    def weight_forces(self, weight: Vec, centre: Vec) -> list[Any]:
+        """Return the actuators' forces under a weight at a point of the platform, from b4."""
+        return self.forces(weight, cross(self._of_platform(centre), weight))
+
+    @cached_property
+    def rates(self) -> list[tuple[Vec, Vec]]:
+        """The velocity of the tool and the turning for a unit rate of each actuator."""
+        arm = minus(self.tool, self.p)
+        units: list[Vec] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+        by_force = [self.forces(unit, cross(arm, unit)) for unit in units]
+        zero: Vec = (0.0 * self.p[0], 0.0, 0.0)
+        by_moment = [self.forces(zero, unit) for unit in units]
+        return [
+            (tuple(-each[i] for each in by_force), tuple(-each[i] for each in by_moment))  # type: ignore[misc]
+            for i in range(6)
+        ]
+
+    @cached_property
+    def tool_speeds(self) -> list[Any]:
+        """Speed of the tool for a unit rate of each actuator, its force for 1 N at the tool."""
+        return [norm(velocity) for velocity, _ in self.rates]
+
+    @cached_property
+    def transmissions(self) -> list[Any]:
+        """The output transmission indices of the six actuators."""
+        joints = [self.ends[0], self.ends[1], self.ends[1], self.ends[2], self.ends[2], self.p]
+        return [
+            1.0 / norm(plus(velocity, cross(turning, minus(joint, self.tool))))
+            for (velocity, turning), joint in zip(self.rates, joints, strict=True)
+        ]
+
+
+def _axes(x: list[Any]) -> tuple[Vec, Vec, Vec]:
+    """Return the platform's axes at home, the columns of its rotation."""
+    (cy, sy), (cp, sp), (cr, sr) = (
+        (np.cos(x[angle]), np.sin(x[angle])) for angle in (YAW, PITCH, ROLL)
+    )
+    u = cy * cp, sy * cp, -sp
+    v = cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr
+    return u, v, cross(u, v)
+
+
+def _distance(a: Vec, u: Vec, b: Vec, v: Vec) -> Any:
+    """Return the distance of the segments from a by u and from b by v.
+
+    Where the closest points lie changes the distance to second order alone, so that it may be
+    found from the real parts.
+    """
+    r = minus(a, b)
+    s, t = closest_shares(*((e[0].real, e[1].real, e[2].real) for e in (u, v, r)))
+    return norm(plus(r, minus(times(s, u), times(t, v))))
+
+
+def closest_shares(u: Vec, v: Vec, r: Vec) -> tuple[FloatArray, FloatArray]:
+    """Return the shares s and t, 0 to 1, at which |r + s u − t v| is least."""
+    uu, vv, uv, ur, vr = dot(u, u), dot(v, v), dot(u, v), dot(u, r), dot(v, r)
+    across = np.maximum(uu * vv - uv * uv, 1e-14 * uu * vv)
+    s = np.clip((uv * vr - ur * vv) / across, 0.0, 1.0)
+    t = np.clip((uv * s + vr) / vv, 0.0, 1.0)
+    # With t at an end of its leg, the nearest point of the other leg is another.
+    s = np.clip((uv * t - ur) / uu, 0.0, 1.0)
+    return s, np.clip((uv * s + vr) / vv, 0.0, 1.0)

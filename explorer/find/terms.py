@@ -1,0 +1,192 @@
+"""The numbers of a requirement as a search needs them, and machines as rows of numbers.
+
+Lengths are over the diagonal of the required box, angles in radians, forces in newtons.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from explorer.find import machine_values as m
+from explorer.find.machine_values import MachineValues
+from explorer.find.requirement import Requirement
+from explorer.mechanism.configuration import tool_position
+from explorer.mechanism.design import LENGTHS, Design, Limits, Swing
+from explorer.mechanism.machine import STANDARD_GRAVITY, Actuators, Payload, Tool
+from explorer.mechanism.pose import (
+    Pose,
+    Triple,
+    rotation_from_yaw_pitch_roll,
+    yaw_pitch_roll_from_rotation,
+)
+from explorer.numerics.arrays import FloatArray
+
+# Millimetres in one unit of the designs that are made.
+UNIT_MM = 10.0
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The limits of a requirement; infinite or zero where nothing is demanded.
+
+    Attributes:
+        requirement: The requirement.
+        scale_mm: Diagonal of the box, in millimetres.
+        edges: Edges of the box, shape (3,).
+        tilt: Largest tilt.
+        ratio, longest: Largest ratio of the lengths of a leg, and longest leg.
+        margin: Least margin.
+        swing: Half-angle of the cones; π without one.
+        distance: Least distance of the axes of two legs; 0 for none.
+        push, pull: Largest forces of the actuators.
+        weight, centre, force: Weight (3,), its point from b4, and the force of any direction.
+        actuator_error, flexibility: Error of each actuator; shortening by a newton.
+        transmission, error, deflection: Limits of these; 0 and infinite for none.
+        speed, velocity, turning: Largest rate of a joint; speed and rate of turning of the tool.
+        hull: Largest edge of the box about all joints.
+    """
+
+    requirement: Requirement
+    scale_mm: float
+    edges: FloatArray
+    tilt: float
+    ratio: float
+    longest: float
+    margin: float
+    swing: float
+    distance: float
+    push: float
+    pull: float
+    weight: FloatArray
+    centre: FloatArray
+    force: float
+    actuator_error: float
+    flexibility: float
+    transmission: float
+    error: float
+    deflection: float
+    speed: float
+    velocity: float
+    turning: float
+    hull: float
+
+    @staticmethod
+    def of(requirement: Requirement) -> Terms:
+        """Return the terms of a requirement."""
+        legs, payload, scale = requirement.legs, requirement.payload, requirement.diagonal_mm
+
+        def most(value: float | None, unit: float = 1.0) -> float:
+            return math.inf if value is None else value / unit
+
+        push = most(legs.push_n)
+        weight = payload.mass_kg * STANDARD_GRAVITY * np.array(requirement.gravity)
+        stiffness = legs.stiffness_n_mm
+        return Terms(
+            requirement=requirement,
+            scale_mm=scale,
+            edges=np.array(requirement.box_mm) / scale,
+            tilt=math.radians(requirement.tilt_deg),
+            ratio=most(legs.ratio),
+            longest=most(legs.longest_mm, scale),
+            margin=requirement.least_margin_mm / scale,
+            swing=math.radians(requirement.swing_deg or 180.0),
+            distance=(legs.diameter_mm + legs.apart_mm) / scale,
+            push=push,
+            pull=push if legs.pull_n is None else legs.pull_n,
+            weight=weight,
+            centre=np.array(payload.centre_mm) / scale,
+            force=payload.force_n,
+            actuator_error=legs.error_mm / scale,
+            flexibility=0.0 if stiffness is None else 1.0 / stiffness / scale,
+            transmission=requirement.transmission or 0.0,
+            error=most(requirement.error_mm, scale),
+            deflection=most(requirement.deflection_mm, scale),
+            speed=most(legs.speed_mm_s, scale),
+            velocity=requirement.tool.speed_mm_s / scale,
+            turning=math.radians(requirement.tool.turning_deg_s),
+            hull=most(requirement.hull_mm, scale),
+        )
+
+    def values(self, x: FloatArray, poses: m.BoxPoses) -> MachineValues:
+        """Return the values of machines (..., n) in poses over the box."""
+        return MachineValues(x, self.edges, poses)
+
+    def tool_at(self, x: FloatArray, poses: m.BoxPoses) -> tuple[FloatArray, FloatArray]:
+        """Return tool positions (k, 3), in mm, and rotations (k, 3, 3) of one machine in poses."""
+        at = self.values(x, poses)
+        columns = [np.stack(np.broadcast_arrays(*each), axis=-1) for each in (at.u, at.v, at.w)]
+        tool = np.stack(np.broadcast_arrays(*at.tool), axis=-1)
+        return self.scale_mm * tool, np.stack(columns, axis=-1)
+
+
+def row_of(design: Design, terms: Terms) -> FloatArray:
+    """Return a design as a machine, shape (18,), with home's tool at the centre of the box."""
+    scale, home = terms.scale_mm / design.unit_mm, design.home_pose
+    x = np.ones(len(m.VARIABLES))
+    x[: m.HX] = np.array(design.variables) / scale
+    x[m.HX : m.BOX_YAW] = np.divide(tool_position(home, design.tool.position), scale)
+    x[m.BOX_YAW] = math.radians(design.required_yaw)
+    x[m.YAW : m.TX] = np.radians(yaw_pitch_roll_from_rotation(home.rotation))
+    x[m.TX : m.TILT] = np.array(design.tool.position) / scale
+    return x
+
+
+def design_of(
+    x: FloatArray, terms: Terms, ranges: FloatArray, name: str, base: Design | None = None
+) -> Design:
+    """Return a machine as a design that states what its requirement asks for.
+
+    Lowest and highest lengths of the legs, shape (4, 2), become its limits. What the requirement
+    does not speak of is that of a base.
+    """
+    requirement = terms.requirement
+    legs, payload = requirement.legs, requirement.payload
+    unit = UNIT_MM if base is None else base.unit_mm
+    scale = terms.scale_mm / unit
+
+    def point(values: FloatArray) -> Triple:
+        a, b, c = (scale * values).tolist()
+        return a, b, c
+
+    def six(value: float | None) -> tuple[float, ...] | None:
+        return None if value is None else (value,) * 6
+
+    rotation = rotation_from_yaw_pitch_roll(np.degrees(x[m.YAW : m.TX]))
+    centre, tool = x[m.HX : m.BOX_YAW], x[m.TX : m.TILT]
+    half = 0.5 * terms.edges
+    swing = Swing(*(requirement.swing_deg,) * 6)
+    radius = 0.5 * legs.diameter_mm / unit
+    limits = Limits(
+        **{name: (low, high) for name, (low, high) in zip(LENGTHS, (scale * ranges).tolist(), strict=True)},
+        margin=requirement.least_margin_mm / unit,
+        leg_radii=(radius,) * 4,
+        swing=swing,
+    )
+    fields = {
+        "name": name,
+        "unit_mm": unit,
+        "a3": tuple((scale * x[m.A3X : m.B1X]).tolist()),
+        "b1": tuple((scale * x[m.B1X : m.B2]).tolist()),
+        "b2": float(scale * x[m.B2]),
+        "b3": float(scale * x[m.B3]),
+        "limits": limits,
+        "home": Pose.of(scale * centre - rotation @ (scale * tool), rotation),
+        "tool": Tool(point(tool)),
+        "payload": Payload(payload.mass_kg, point(terms.centre), payload.force_n),
+        "gravity": requirement.gravity,
+        "actuators": Actuators(
+            push_n=six(legs.push_n),  # type: ignore[arg-type]
+            pull_n=six(legs.pull_n),  # type: ignore[arg-type]
+            error_mm=six(legs.error_mm),  # type: ignore[arg-type]
+            stiffness_n_mm=six(legs.stiffness_n_mm),  # type: ignore[arg-type]
+            speed_mm_s=six(legs.speed_mm_s),  # type: ignore[arg-type]
+            acceleration_mm_s2=six(legs.acceleration_mm_s2),  # type: ignore[arg-type]
+        ),
+        "required_box": (point(centre - half), point(centre + half)),
+        "required_yaw": math.degrees(float(x[m.BOX_YAW])),
+    }
+    return Design(**fields) if base is None else msgspec.structs.replace(base, **fields)
