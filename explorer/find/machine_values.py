@@ -4,7 +4,8 @@ A machine is a row of numbers, `VARIABLES`, with lengths over the diagonal of th
 pose is a place in the box with a tilt. All formulas are analytic in the variables, so that complex
 numbers pass through them: with an imaginary step far below rounding the imaginary part of a result
 over that step is its derivative, to the last digits (W. Squire and G. Trapp, "Using complex
-variables to estimate derivatives of real functions", 1998).
+variables to estimate derivatives of real functions", 1998). Affine forms pass through them as well,
+and bound the results over cells of poses.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from explorer.legs.clearance import PAIRS
+from explorer.numerics.affine import Affine
 from explorer.numerics.arrays import FloatArray
 
 Vec = tuple[Any, Any, Any]
@@ -86,7 +88,8 @@ def cross(a: Vec, b: Vec) -> Vec:
 
 def norm(a: Vec) -> Any:
     """Return |a|, analytic where it is not zero."""
-    return np.sqrt(dot(a, a))
+    square = dot(a, a)
+    return square.root() if isinstance(square, Affine) else np.sqrt(square)
 
 
 class MachineValues:
@@ -96,7 +99,7 @@ class MachineValues:
     """
 
     def __init__(self, x: FloatArray, edges: FloatArray, poses: BoxPoses) -> None:
-        self.poses, self.x = poses, [column[..., None] for column in np.moveaxis(x, -1, 0)]
+        self.poses, self.edges, self.x = poses, edges, [column[..., None] for column in np.moveaxis(x, -1, 0)]
         x = self.x
         along = (0.5 * edges * poses.places).T
         c, s = np.cos(x[BOX_YAW]), np.sin(x[BOX_YAW])
@@ -110,7 +113,7 @@ class MachineValues:
         self._cos, self._sin = np.cos(x[TILT] * size), np.sin(x[TILT] * size)
         self.home_axes = _axes(x)
         self.u, self.v, self.w = map(self._tilted, self.home_axes)
-        self.p = minus(self.tool, self._of_platform((x[TX], x[TY], x[TZ])))
+        self.p = minus(self.tool, self.of_platform((x[TX], x[TY], x[TZ])))
 
     def _tilted(self, a: Vec) -> Vec:
         n = self._axis
@@ -119,7 +122,8 @@ class MachineValues:
         turned = plus(times(self._cos, a), times(self._sin, around))
         return turned[0] + part * n[0], turned[1] + part * n[1], turned[2]
 
-    def _of_platform(self, a: Vec) -> Vec:
+    def of_platform(self, a: Vec) -> Vec:
+        """Return a vector of the platform along the axes of the base."""
         return plus(plus(times(a[0], self.u), times(a[1], self.v)), times(a[2], self.w))
 
     @cached_property
@@ -200,34 +204,49 @@ class MachineValues:
 
     def weight_forces(self, weight: Vec, centre: Vec) -> list[Any]:
         """Return the actuators' forces under a weight at a point of the platform, from b4."""
-        return self.forces(weight, cross(self._of_platform(centre), weight))
+        return self.forces(weight, cross(self.of_platform(centre), weight))
 
     @cached_property
-    def rates(self) -> list[tuple[Vec, Vec]]:
-        """The velocity of the tool and the turning for a unit rate of each actuator."""
+    def velocities(self) -> list[Vec]:
+        """The velocity of the tool for a unit rate of each actuator."""
         arm = minus(self.tool, self.p)
-        units: list[Vec] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
-        by_force = [self.forces(unit, cross(arm, unit)) for unit in units]
-        zero: Vec = (0.0 * self.p[0], 0.0, 0.0)
-        by_moment = [self.forces(zero, unit) for unit in units]
-        return [
-            (tuple(-each[i] for each in by_force), tuple(-each[i] for each in by_moment))  # type: ignore[misc]
-            for i in range(6)
-        ]
+        return _columns([self.forces(unit, cross(arm, unit)) for unit in UNITS])
+
+    @cached_property
+    def turnings(self) -> list[Vec]:
+        """The angular velocity of the platform for a unit rate of each actuator."""
+        none: Vec = (0.0 * self.p[0], 0.0, 0.0)
+        return _columns([self.forces(none, unit) for unit in UNITS])
 
     @cached_property
     def tool_speeds(self) -> list[Any]:
         """Speed of the tool for a unit rate of each actuator, its force for 1 N at the tool."""
-        return [norm(velocity) for velocity, _ in self.rates]
+        return [norm(velocity) for velocity in self.velocities]
 
     @cached_property
     def transmissions(self) -> list[Any]:
         """The output transmission indices of the six actuators."""
+        return [1.0 / norm(velocity) for velocity in self.own_velocities]
+
+    @cached_property
+    def own_velocities(self) -> list[Vec]:
+        """The velocity of each actuator's point of the platform for its unit rate."""
         joints = [self.ends[0], self.ends[1], self.ends[1], self.ends[2], self.ends[2], self.p]
         return [
-            1.0 / norm(plus(velocity, cross(turning, minus(joint, self.tool))))
-            for (velocity, turning), joint in zip(self.rates, joints, strict=True)
+            plus(velocity, cross(turning, minus(joint, self.tool)))
+            for velocity, turning, joint in zip(
+                self.velocities, self.turnings, joints, strict=True
+            )
         ]
+
+
+UNITS: list[Vec] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+
+
+def _columns(forces: list[list[Any]]) -> list[Vec]:
+    """Return the motions of unit rates from the forces that hold three unit loads."""
+    x, y, z = forces
+    return [(-a, -b, -c) for a, b, c in zip(x, y, z, strict=True)]
 
 
 def _axes(x: list[Any]) -> tuple[Vec, Vec, Vec]:

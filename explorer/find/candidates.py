@@ -1,0 +1,86 @@
+"""Machines that a search starts from: of many random ones, those that nearly keep a requirement.
+
+Each is looked at in the
+corners of the box, first without a tilt, and the few that are left at the largest tilts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from explorer.find import machine_values as m
+from explorer.find.machine_values import HOME, BoxPoses, MachineValues
+from explorer.find.over_tilts import CORNERS
+from explorer.find.terms import Terms
+from explorer.numerics.arrays import FloatArray
+
+# Ranges of the variables, over the diagonal of the box or in radians.
+LOWS = np.array([-2.5, -2.5, *[-1.2] * 4, -2.0, -2.0, 0.1, *[-math.pi] * 2, -1.0, -1.0, *[-0.8] * 3])
+HIGHS = np.array([2.5, 2.5, *[1.2] * 4, 2.0, 2.0, 2.5, *[math.pi] * 2, 1.0, 1.0, *[0.8] * 3])
+BLOCK = 8192
+# Azimuths of the tilts at which the corners are looked at.
+AZIMUTHS = 8
+# Candidates that miss a demand by more than this are dropped after each look.
+NEARLY = 0.6
+
+
+def standard_poses(tilt: float) -> BoxPoses:
+    """Return home, the corners of the box, and the corners at the largest tilt."""
+    angles = 2.0 * math.pi * np.arange(AZIMUTHS) / AZIMUTHS
+    vectors = tilt * np.column_stack([np.cos(angles), np.sin(angles)])
+    corners = BoxPoses(CORNERS, np.zeros((8, 2)))
+    found = HOME.plus(corners)
+    if tilt > 0.0:
+        tilted = BoxPoses(np.repeat(CORNERS, AZIMUTHS, axis=0), np.tile(vectors, (8, 1)))
+        found = found.plus(tilted)
+    return found
+
+
+def misses(terms: Terms, at: MachineValues, home: MachineValues) -> tuple[FloatArray, FloatArray]:
+    """Return what machines (n, variables) miss over poses, and their longest legs, (n,) each.
+
+    What is missed is the largest share by which a demand is exceeded, negative if all are kept.
+    """
+    lengths = np.stack(at.lengths, axis=-1)
+    longest, shortest = lengths.max(axis=1), lengths.min(axis=1)
+    large = longest.max(axis=1)
+    found = [(longest / shortest).max(axis=1) / terms.ratio - 1.0, large / terms.longest - 1.0]
+    signed = [np.sign(own) * each for own, each in zip(home.margins, at.margins, strict=True)]
+    least = np.min([each.min(axis=1) for each in signed], axis=0)
+    found.append((terms.margin - least) / (0.1 * large))
+    if terms.swing < math.pi:
+        cosine = np.min([each.min(axis=1) for each in at.swings(home)], axis=0)
+        swing = np.arccos(np.clip(cosine, -1.0, 1.0))
+        found.append(swing / terms.swing - 1.0)
+    if terms.distance > 0.0:
+        near = np.min([each.min(axis=1) for each in at.distances], axis=0)
+        found.append(1.0 - near / terms.distance)
+    return np.max(found, axis=0), large
+
+
+def candidates(terms: Terms, seed: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Yield machines of one block after another that nearly keep the limits, with `misses`."""
+    count = m.TILT if "tool" in terms.requirement.free else m.TX
+    random = np.random.default_rng(seed)
+    poses = standard_poses(terms.tilt)
+    looks = [poses.at(slice(0, 3)), poses.at(slice(0, 9)), poses]
+    while True:
+        shares = random.random((BLOCK, count))
+        x = np.ones((BLOCK, len(m.VARIABLES)))
+        x[:, m.TX : m.TILT] = 0.0
+        x[:, :count] = LOWS[:count] + (HIGHS - LOWS)[:count] * shares
+        is_level = np.arange(BLOCK) % 2 == 0
+        if "orientation" not in terms.requirement.free:
+            is_level[:] = True
+        x[is_level, m.PITCH : m.TX] = 0.0
+        missed = np.zeros(len(x))
+        large = missed
+        for look in looks:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                missed, large = misses(terms, terms.values(x, look), terms.values(x, HOME))
+            kept = missed < NEARLY
+            x, missed, large = x[kept], missed[kept], large[kept]
+        yield x, missed, large

@@ -1,0 +1,283 @@
+"""The improvement of a machine by SQP, with the demands at some poses and their exact gradients.
+
+Shortest and longest lengths are variables of their own, and so is the worst of each quantity that a
+preference lowers: they stay beyond all values at the poses, which keeps the functions smooth.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from explorer.find import machine_values as m
+from explorer.find.machine_values import HOME, BoxPoses
+from explorer.find.over_tilts import sides_of
+from explorer.find.requirement import Preference
+from explorer.find.terms import Terms
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.search import one_thread
+from explorer.optimise.search.sqp import Point, Stop, slsqp
+
+# Imaginary step: far below rounding, so that derivatives have no error of their own.
+STEP = 1e-40
+# Demands that every pose has to spare, as a share, so that poses between them keep these too.
+RESERVE = 1e-4
+# Least |a3y|, |b1y| and |b3 − b2| over the diagonal of the box.
+LEAST = 0.04
+# Bounds of lengths, over the diagonal of the box.
+FARTHEST = 8.0
+PRECISION = 1e-7
+
+LENGTH, FORCE, STIFFNESS, ERROR, SINGULAR, CLEARANCE = range(6)
+"""What preferences lower: the longest leg; the largest force, the compliance and the error of the
+tool for equal actuators; one over the transmission index; one over the least distance of legs."""
+
+WEIGHTS: Mapping[Preference, Mapping[int, float]] = MappingProxyType(
+    {
+        "balanced": {LENGTH: 1.0, FORCE: 0.5, SINGULAR: 0.5},
+        "small": {LENGTH: 1.0},
+        "little-force": {LENGTH: 0.2, FORCE: 1.0},
+        "stiff": {LENGTH: 0.2, STIFFNESS: 1.0},
+        "precise": {LENGTH: 0.2, ERROR: 1.0},
+        "far-from-singular": {LENGTH: 0.2, SINGULAR: 1.0},
+        "easy-to-build": {LENGTH: 0.5, CLEARANCE: 1.0},
+    }
+)
+"""Exponents of the quantities whose product a preference makes least."""
+
+
+@dataclass(frozen=True)
+class Improved:
+    """A machine after an improvement.
+
+    Attributes:
+        x: The machine, shape (18,).
+        missed: The largest amount by which a demand is missed at the poses; 0 if all are kept.
+        cost: Logarithm of the product that the preference makes least.
+    """
+
+    x: FloatArray
+    missed: float
+    cost: float
+
+
+def free_variables(terms: Terms) -> list[int]:
+    """Return the indices of the variables that a search may change."""
+    free = [*range(m.YAW + 1)]
+    if "orientation" in terms.requirement.free:
+        free += [m.PITCH, m.ROLL]
+    if "tool" in terms.requirement.free:
+        free += [m.TX, m.TY, m.TZ]
+    return free
+
+
+class Improvement:
+    """A requirement and a preference as the functions of an SQP solver, from a machine on.
+
+    The demands are looked at in poses; each round takes those that a machine nearly misses.
+    """
+
+    def __init__(
+        self,
+        terms: Terms,
+        preference: Preference,
+        start: FloatArray,
+        before_each: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.terms, self.weights = terms, WEIGHTS[preference]
+        self.start, self.sides = start, sides_of(start, terms)
+        self.free, self._before_each = free_variables(terms), before_each
+        self.extra = [each for each in self.weights if each != LENGTH]
+        self.evaluations = 0
+
+    def table(self, x: FloatArray, poses: BoxPoses, bounds: FloatArray) -> FloatArray:
+        """Return the slacks of machines (n, 18) in poses, shape (n, demands, k).
+
+        The bounds, shape (n, 5 + extra), are the shortest length of each leg, the longest of all,
+        and the logarithms of what the preference lowers.
+        """
+        terms = self.terms
+        at, home = terms.values(x, poses), terms.values(x, HOME)
+        shortest, longest = bounds.T[:4, :, None], bounds.T[4, :, None]
+        rows = [length - short for length, short in zip(at.lengths, shortest, strict=True)]
+        rows += [longest - length for length in at.lengths]
+        if math.isfinite(terms.ratio):
+            ratio = terms.ratio * (1.0 - RESERVE)
+            rows += [ratio * short - each for each, short in zip(at.lengths, shortest, strict=True)]
+        signed = zip(self.sides, (*at.margins, at.order), strict=True)
+        margins = [side * each for side, each in signed]
+        rows += [each - terms.margin * (1.0 + RESERVE) for each in margins[:3]]
+        rows.append(margins[3] - 0.01)
+        if terms.swing < math.pi:
+            cosine = math.cos(terms.swing) + RESERVE
+            rows += [each - cosine for each in at.swings(home)]
+        if terms.distance > 0.0:
+            rows += [each - terms.distance * (1.0 + 20.0 * RESERVE) for each in at.distances]
+        rows += self._machine(at)
+        rows += self._preferred(at, bounds.T[5:, :, None])
+        shape = (len(x), len(poses.places))
+        return np.stack([np.broadcast_to(row, shape) for row in rows], axis=1)
+
+    def _machine(self, at: m.MachineValues) -> list[FloatArray]:
+        """Return the slacks of forces, speeds, transmission, error and deflection."""
+        terms, rows = self.terms, list[FloatArray]()
+        keeps = 1.0 - 50.0 * RESERVE
+        if math.isfinite(terms.push) and (terms.force or terms.weight.any()):
+            weight, centre = (tuple(each) for each in (terms.weight, terms.centre))
+            for held, speed in zip(at.weight_forces(weight, centre), at.tool_speeds, strict=True):
+                rows.append(keeps - (held + terms.force * speed) / terms.push)
+                rows.append(keeps - (terms.force * speed - held) / terms.pull)
+        if math.isfinite(terms.speed) and terms.turning:
+            points = [at.ends[0], at.ends[1], at.ends[2], at.ends[3]]
+            for end, leg, length in zip(points, at.legs, at.lengths, strict=True):
+                arm = m.minus(end, at.tool)
+                lever = m.norm(m.cross(arm, m.times(1.0 / length, leg)))
+                rows.append(keeps - (terms.velocity + terms.turning * lever) / terms.speed)
+        if terms.transmission:
+            rows += [each - terms.transmission / keeps for each in at.transmissions]
+        if math.isfinite(terms.error):
+            total = sum(at.tool_speeds)
+            rows.append(keeps - terms.actuator_error * total / terms.error)
+        if math.isfinite(terms.deflection):
+            weight, centre = (tuple(each) for each in (terms.weight, terms.centre))
+            forces = [_size(each) for each in at.weight_forces(weight, centre)]
+            total = sum(
+                speed * (force + terms.force * speed)
+                for speed, force in zip(at.tool_speeds, forces, strict=True)
+            )
+            rows.append(keeps - terms.flexibility * total / terms.deflection)
+        return rows
+
+    def _preferred(self, at: m.MachineValues, bounds: FloatArray) -> list[FloatArray]:
+        """Return the slacks of what the preference lowers below their bounds, as logarithms."""
+        rows: list[FloatArray] = []
+        for kind, bound in zip(self.extra, bounds, strict=True):
+            speeds = at.tool_speeds
+            match kind:
+                case 1:
+                    rows += [bound - np.log(each) for each in speeds]
+                case 2:
+                    rows.append(bound - np.log(sum(each * each for each in speeds)))
+                case 3:
+                    rows.append(bound - np.log(sum(speeds)))
+                case 4:
+                    rows += [bound + np.log(each) for each in at.transmissions]
+                case _:
+                    rows += [bound + np.log(each) for each in at.distances]
+        return rows
+
+    def _first_bounds(self, x: FloatArray, poses: BoxPoses) -> FloatArray:
+        """Return the least bounds that one machine keeps in poses, shape (5 + extra,)."""
+        none = np.zeros((1, 5 + len(self.extra)))
+        table = self.table(x[None], poses, none)[0].min(axis=1)
+        lengths = [-float(table[4 + leg]) for leg in range(4)]
+        preferred = self._preferred(self.terms.values(x[None], poses), none.T[5:, :, None])
+        worst = [-float(np.min(each)) for each in preferred]
+        return np.array([*table[:4], max(lengths), *self._group(worst)])
+
+    def _group(self, worst: list[float]) -> list[float]:
+        """Return the largest of the rows of each preferred quantity."""
+        found: list[float] = []
+        start = 0
+        for kind in self.extra:
+            count = 1 if kind in (STIFFNESS, ERROR) else 6
+            found.append(max(worst[start : start + count]))
+            start += count
+        return found
+
+    def run(self, poses: BoxPoses, *, most: int = 12, rounds: int = 12) -> Improved:
+        """Return the machine after the solver's steps, and what it still misses at the poses."""
+        x, free = self.start.copy(), self.free
+        n = len(free)
+        bounds = self._first_bounds(x, poses)
+        chosen = np.zeros((0, 2), dtype=np.int64)
+        lows, highs = _ranges(self, x)
+        cost = math.inf
+        for turn in range(rounds):
+            slacks = self.table(x[None], poses, bounds[None])[0]
+            order = np.argsort(slacks, axis=1)[:, :LOOKS]
+            pairs = np.column_stack([np.repeat(np.arange(len(slacks)), order.shape[1]), order.ravel()])
+            chosen = np.unique(np.concatenate([chosen, pairs]), axis=0)
+            used, places = np.unique(chosen[:, 1], return_inverse=True)
+            rows, looked = (chosen[:, 0], places), poses.at(used)
+            steps = 1j * STEP * np.eye(n + len(bounds))
+
+            def evaluate(y: FloatArray) -> Point:
+                self._before_each()
+                self.evaluations += 1
+                given = np.concatenate([y[None] + 0j, y + steps])
+                machines = np.repeat(x[None] + 0j, len(given), axis=0)
+                machines[:, free] = given[:, :n]
+                table = self.table(machines, looked, given[:, n:])[:, *rows]
+                slope = np.zeros(len(y))
+                slope[n + 4] = self.weights[LENGTH] / y[n + 4]
+                for index, kind in enumerate(self.extra):
+                    slope[n + 5 + index] = self.weights[kind]
+                return self._cost(y[n:]), slope, table[0].real, (table[1:].imag / STEP).T
+
+            y = np.concatenate([x[free], bounds])
+            before = y
+            with contextlib.suppress(Stop), np.errstate(all="ignore"), one_thread():
+                near = np.full(len(y), math.inf)
+                near[:n] = TRUSTED
+                ends = np.column_stack([np.maximum(lows, y - near), np.minimum(highs, y + near)])
+                equal = np.zeros(len(chosen), dtype=bool)
+                y = slsqp(evaluate, lambda *_: None, y, ends, equal, most=most, precision=PRECISION)
+            if not np.isfinite(y).all():
+                y = before
+            x = x.copy()
+            x[free], bounds = y[:n], y[n:]
+            last, cost = cost, self._cost(bounds)
+            missed = self.missed(x, poses, bounds)
+            if missed <= FEASIBLE and last - cost < SETTLED:
+                break
+            if turn >= PATIENCE and missed > HOPELESS:
+                break
+        return Improved(x, self.missed(x, poses, bounds), self._cost(bounds))
+
+    def cost(self, poses: BoxPoses) -> float:
+        """Return the cost of the start, with the least bounds that it keeps in poses."""
+        return self._cost(self._first_bounds(self.start, poses))
+
+    def _cost(self, bounds: FloatArray) -> float:
+        weights = [self.weights[kind] for kind in self.extra]
+        return self.weights[LENGTH] * math.log(bounds[4]) + float(np.dot(weights, bounds[5:]))
+
+    def missed(self, x: FloatArray, poses: BoxPoses, bounds: FloatArray) -> float:
+        """Return the largest amount by which a demand is missed in poses; 0 if none is."""
+        with np.errstate(all="ignore"):
+            least = float(np.min(self.table(x[None], poses, bounds[None])))
+        return max(0.0, -least) if math.isfinite(least) else math.inf
+
+
+# Poses at which each demand is looked at in the beginning, and amount that is no miss.
+LOOKS = 4
+FEASIBLE = 1e-6
+# Largest change of a variable in a round, and change of the cost that ends the rounds.
+TRUSTED, SETTLED = 0.3, 1e-3
+# Rounds after which a machine that misses a demand by more than this is given up.
+PATIENCE, HOPELESS = 3, 0.02
+
+
+def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return lows and highs of the variables and of the bounds of an improvement."""
+    lows, highs = np.full(len(m.VARIABLES), -FARTHEST), np.full(len(m.VARIABLES), FARTHEST)
+    for index in (m.A3Y, m.B1Y):
+        (lows if x[index] > 0.0 else highs)[index] = math.copysign(LEAST, x[index])
+    for index in (m.BOX_YAW, m.YAW, m.PITCH, m.ROLL):
+        lows[index], highs[index] = x[index] - 1.0, x[index] + 1.0
+    free = search.free
+    count = len(search.extra)
+    least = [0.02] * 4 + [0.1] + [-30.0] * count
+    most = [FARTHEST] * 4 + [min(FARTHEST, search.terms.longest)] + [30.0] * count
+    return np.array([*lows[free], *least]), np.array([*highs[free], *most])
+
+
+def _size(value: FloatArray) -> FloatArray:
+    """Return |value|, analytic where it is not zero."""
+    return np.where(np.real(value) < 0.0, -value, value)
