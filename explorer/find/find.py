@@ -11,21 +11,26 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from explorer.find import machine_values as m
-from explorer.find.answers import FoundDesign, FoundDesigns
+from explorer.find.answers import FoundDesign, FoundDesigns, Relaxation
 from explorer.find.candidates import candidates, standard_poses
 from explorer.find.certificate import Certificate, certify, is_regular
 
 from explorer.find.improvement import Improvement, free_variables
 from explorer.find.machine_values import HOME
+from explorer.find.bound import impossible_demands, least_longest_mm
+from explorer.find.check import check_machine
+from explorer.find.nearest import nearest_values, relaxable_fields
+from explorer.find.over_poses import demand_names
+from explorer.find.over_tilts import limit_names
 from explorer.find.requirement import PREFERENCES, Preference, Requirement
 from explorer.find.terms import Terms, design_of, row_of
 from explorer.legs.clearance import PAIRS
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import LENGTHS, Design
 from explorer.numerics import checks
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.search.sqp import Stop
@@ -34,10 +39,12 @@ from explorer.optimise.search.sqp import Stop
 UNITS_PER_SECOND = 250.0
 # Units of a block of candidates, of one evaluation of a machine, and of a certificate.
 BLOCK_UNITS, EVALUATION_UNITS, CERTIFICATE_UNITS = 50.0, 1.0, 20.0
+# Seconds of a search for a relaxed requirement.
+RELAXED_SECONDS = 2.0
 # Factor on the seconds after which a search ends on a slow machine all the same.
 PATIENCE = 4.0
 # Rounds of an improvement and a certificate, and cells of poses of the latter.
-ROUNDS, CELLS = 8, 4000
+ROUNDS, CELLS, FINAL_CELLS = 8, 4000, 20_000
 # Random machines that are certified as they are until one is kept, and improved ones of a block.
 TRIED, IMPROVED = 8, 6
 # Share of the distance of legs beyond which a clearance that is missed is that of crossed legs.
@@ -71,6 +78,7 @@ class Search:
         units: Units of work that it may take.
         ends: Time of the clock at which it ends at the latest.
         stop: Function that says whether to end.
+        is_first_enough: Whether the first machine ends the search.
         best: The best machine of each kind.
     """
 
@@ -80,8 +88,8 @@ class Search:
     ends: float
     stop: Callable[[], bool]
     seed: int
+    is_first_enough: bool = False
     best: dict[Preference, Machine] = field(default_factory=dict[Preference, Machine])
-    nearly: list[tuple[float, FloatArray]] = field(default_factory=list[tuple[float, FloatArray]])
     done: float = 0.0
     is_cancelled: bool = False
 
@@ -101,6 +109,8 @@ class Search:
                 found = each if isinstance(each, Machine) else self.improve(*each)
                 if found is not None and self._add(found):
                     tell()
+                    if self.is_first_enough:
+                        return
         except Stop:
             return
 
@@ -171,3 +181,143 @@ class Search:
                 return None
             poses = poses.plus(found.worst_poses)
         return None
+
+
+def find_designs(
+    requirement: Requirement,
+    *,
+    prefer: Preference | None = None,
+    count: int = 4,
+    seconds: float = 10.0,
+    seed: int = 0,
+    design: Design | None = None,
+    watch: Callable[[FoundDesigns], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> FoundDesigns:
+    """Search for designs that keep a requirement.
+
+    With the same seed and the same seconds the designs are the same, unless the machine is so slow
+    that the search ends by the clock.
+
+    Args:
+        requirement: The requirement.
+        prefer: Kind of machine that is preferred; that of the requirement if None.
+        count: Number of designs, of different kinds, 1 to 7.
+        seconds: Time of the search on a usual core.
+        seed: Seed of the random machines.
+        design: Design to improve in place of random machines; it need not keep the requirement.
+        watch: Called with what is found so far each time it is better.
+        stop: Called some hundred times a second; True ends the search and keeps what was found.
+
+    Raises:
+        InputError: A number is out of range, or there is no such preference.
+    """
+    preferred = checks.one_of("prefer", prefer or requirement.prefer, PREFERENCES)
+    checks.whole("count", count, 1, len(PREFERENCES))
+    checks.whole("seed", seed, 0, 2**31 - 1)
+    seconds = checks.positive("seconds", seconds)
+    terms = Terms.of(requirement)
+    bound, impossible = least_longest_mm(requirement), impossible_demands(requirement)
+    kinds = tuple(dict.fromkeys((preferred, *OTHER_KINDS)))[:count]
+    if impossible:
+        refused = FoundDesigns((), bound, impossible, status="impossible")
+        if watch:
+            watch(refused)
+        nearest = _nearest(requirement, seed, seconds, stop or _never)
+        return replace(refused, nearest=nearest)
+    start = None if design is None else row_of(design, terms)
+    ends = time.perf_counter() + PATIENCE * seconds
+    units = UNITS_PER_SECOND * seconds
+    search = Search(terms, kinds, units, ends, stop or _never, seed)  # type: ignore[arg-type]
+
+    def so_far(cells: int = 0) -> FoundDesigns:
+        found = [search.best[kind] for kind in search.kinds if kind in search.best]
+        designs = tuple(_answer(each, terms, design, cells) for each in found)
+        binding = () if not found else _binding(found[0], terms)
+        return FoundDesigns(designs, bound, (), binding)
+
+    search.run(start, lambda: watch(so_far()) if watch else None)
+    found = so_far(FINAL_CELLS)
+    if found.designs:
+        return found
+    if search.is_cancelled:
+        return FoundDesigns((), bound, status="cancelled")
+    nearest = _nearest(requirement, seed, seconds, stop or _never)
+    binding = tuple(each.words for each in nearest)
+    return FoundDesigns((), bound, (), binding, nearest, "none")
+
+
+def _nearest(
+    requirement: Requirement, seed: int, seconds: float, stop: Callable[[], bool]
+) -> tuple[Relaxation, ...]:
+    """Return the nearest values of the demands that can be relaxed, some seconds each."""
+    fields, found = relaxable_fields(requirement), list[Relaxation]()
+    for field in fields:
+        last: list[FloatArray] = []
+
+        def keeps(relaxed: Requirement, last: list[FloatArray] = last) -> bool:
+            units = UNITS_PER_SECOND * min(seconds, RELAXED_SECONDS)
+            ends = time.perf_counter() + PATIENCE * min(seconds, RELAXED_SECONDS)
+            search = Search(Terms.of(relaxed), ("small",), units, ends, stop, seed, is_first_enough=True)
+            if impossible_demands(relaxed):
+                return False
+            search.run(last[-1] if last else None, lambda: None)
+            if "small" in search.best:
+                last.append(search.best["small"].x)
+            return "small" in search.best
+
+        if stop():
+            break
+        found += nearest_values(requirement, [field], keeps)
+    return tuple(found)
+
+
+def _never() -> bool:
+    return False
+
+
+def _answer(found: Machine, terms: Terms, base: Design | None, cells: int) -> FoundDesign:
+    """Return a machine as a design with its check; its proof is tried again with more cells."""
+    certificate = found.certificate
+    if cells and not certificate.is_proven:
+        certificate = certify(found.x, terms, cells=cells)
+    name = f"{terms.requirement.name} {found.kind}"
+    design = design_of(found.x, terms, certificate.ranges, name, base)
+    poses = standard_poses(terms.tilt).plus(certificate.limit_poses).plus(certificate.demand_poses)
+    at = terms.values(found.x, poses)
+    speeds = np.stack(np.broadcast_arrays(*at.tool_speeds))
+    held = np.stack(
+        np.broadcast_arrays(
+            *at.weight_forces(tuple(terms.weight.tolist()), tuple(terms.centre.tolist()))
+        )
+    )
+    forces = np.maximum(
+        (held + terms.force * speeds) / terms.push, (terms.force * speeds - held) / terms.pull
+    )
+    legs = terms.requirement.legs
+    return FoundDesign(
+        design=design,
+        check=check_machine(design, found.x, terms, certificate),
+        kind=found.kind,
+        longest_mm=float(terms.scale_mm * certificate.ranges[:, 1].max()),
+        utilisation=float(forces.max()),
+        force_per_newton=float(speeds.max()),
+        clearance_mm=float(terms.scale_mm * np.min(at.distances)) - legs.diameter_mm,
+        transmission=float(np.min(at.transmissions)),
+        error_mm=float(legs.error_mm * speeds.sum(axis=0).max()),
+    )
+
+
+# Demands with less than this to spare, over the diagonal or over their limit, bind a design.
+BINDING = 5e-3
+
+
+def _binding(found: Machine, terms: Terms) -> tuple[str, ...]:
+    """Return the names of the demands that bind a machine."""
+    certificate = found.certificate
+    names = [*limit_names(terms), *demand_names(terms)]
+    missed = [*certificate.missed_limits.tolist(), *certificate.missed_demands.tolist()]
+    ratios = certificate.ranges[:, 1] / certificate.ranges[:, 0]
+    binding = [n for n, each in zip(names[8:], missed[8:], strict=True) if each > -BINDING]
+    legs = zip(LENGTHS, ratios.tolist(), strict=True)
+    return (*(f"ratio {n}" for n, each in legs if each > terms.ratio * (1 - BINDING)), *binding)
