@@ -18,7 +18,9 @@ from explorer.find.terms import Terms
 from explorer.numerics.arrays import FloatArray
 
 # Ranges of the variables, over the diagonal of the box or in radians.
-LOWS = np.array([-2.5, -2.5, *[-1.2] * 4, -2.0, -2.0, 0.1, *[-math.pi] * 2, -1.0, -1.0, *[-0.8] * 3])
+LOWS = np.array(
+    [-2.5, -2.5, *[-1.2] * 4, -2.0, -2.0, 0.1, *[-math.pi] * 2, -1.0, -1.0, *[-0.8] * 3]
+)
 HIGHS = np.array([2.5, 2.5, *[1.2] * 4, 2.0, 2.0, 2.5, *[math.pi] * 2, 1.0, 1.0, *[0.8] * 3])
 BLOCK = 8192
 # Azimuths of the tilts at which the corners are looked at.

@@ -13,7 +13,7 @@ import numpy as np
 from explorer.find import machine_values as m
 from explorer.find.candidates import standard_poses
 from explorer.find.machine_values import BoxPoses
-from explorer.find.over_poses import missed_amounts, poses_of, prove_demands
+from explorer.find.over_poses import missed_amounts, poses_of, prove_demands, sample_demands
 from explorer.find.over_tilts import limit_names, prove_limits, worst_place
 from explorer.find.terms import Terms
 from explorer.numerics.arrays import FloatArray
@@ -23,6 +23,8 @@ from explorer.numerics.cells import CellValues
 PADDING = 1e-5
 # Amount up to which a demand is kept, over the diagonal or over its limit.
 TOLERANCE = 1e-9
+# Random poses in which demands are computed that are not proven.
+SAMPLES = 20_000
 # Rounds in which the ranges of the lengths grow until nothing exceeds them.
 ROUNDS = 6
 
@@ -133,6 +135,14 @@ def certify(
             found = CellValues(np.full(k, -np.inf), np.zeros((k, 5)), np.full(k, np.inf))
         else:
             found = prove_demands(x, terms, cells)
+            if (found.bounds > TOLERANCE).any() and (found.values <= TOLERANCE).all():
+                more = sample_demands(x, terms, SAMPLES)
+                is_more = more.values > found.values
+                found = CellValues(
+                    np.where(is_more, more.values, found.values),
+                    np.where(is_more[:, None], more.places, found.places),
+                    np.maximum(found.bounds, more.values),
+                )
     values, at = found.values, poses_of(found.places)
     if len(values):
         rows = sampled.argmax(axis=0)

@@ -16,9 +16,9 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.find import machine_values as m
 from explorer.find.answers import DemandCheck, RequirementCheck
-from explorer.find.certificate import Certificate, certify, lengths_over
+from explorer.find.certificate import SAMPLES, Certificate, certify, lengths_over
 from explorer.find.machine_values import BoxPoses
-from explorer.find.over_poses import demand_names, missed_amounts, poses_of
+from explorer.find.over_poses import demand_names
 from explorer.find.over_tilts import CORNERS, SWINGS, limit_names
 from explorer.find.requirement import Requirement
 from explorer.find.terms import Terms, row_of
@@ -31,8 +31,6 @@ from explorer.numerics.arrays import FloatArray
 from explorer.paths.time_law import law_at_speed
 from explorer.prototype.fitting import buildability
 
-# Random poses in which demands are computed that are not proven.
-RANDOM_POSES = 50_000
 # Tolerance of lengths over the diagonal of the box, with which found designs keep their own limits.
 CLOSE = 1e-7
 
@@ -60,7 +58,7 @@ def check_machine(
     check = _Check(design, x, terms, certificate)
     demands = tuple(check.demands())
     is_open = not all(demand.proven for demand in demands)
-    return RequirementCheck(demands, RANDOM_POSES if is_open else 0)
+    return RequirementCheck(demands, SAMPLES if is_open else 0)
 
 
 class _Worst(NamedTuple):
@@ -78,7 +76,6 @@ class _Check:
     def __init__(self, design: Design, x: FloatArray, terms: Terms, found: Certificate) -> None:
         self.design, self.x, self.terms, self.found = design, x, terms, found
         self.limits, self.names = limit_names(terms), demand_names(terms)
-        self._random: FloatArray | None = None
 
     def demands(self) -> Iterator[DemandCheck]:
         """Yield the demands in the order of the file."""
@@ -107,7 +104,10 @@ class _Check:
         if terms.transmission:
             worst = self._worst_demand("transmission")
             yield self._row(worst, terms.transmission, "", "transmission index", -1.0, 1.0)
-        for name, limit in (("error", requirement.error_mm), ("deflection", requirement.deflection_mm)):
+        for name, limit in (
+            ("error", requirement.error_mm),
+            ("deflection", requirement.deflection_mm),
+        ):
             if limit is not None:
                 worst = self._worst_demand(name)
                 yield self._row(worst, limit, "mm", name, 1.0, limit)
@@ -139,8 +139,14 @@ class _Check:
         name = f"{'shortest' if is_short else 'longest'} {LENGTHS[leg]}"
         proven = bool(found.limits[:8].all()) and kept
         yield DemandCheck(
-            name, kept, size * float(worst), size * float(own), size * spare, "mm",
-            self._pose(poses), proven,
+            name,
+            kept,
+            size * float(worst),
+            size * float(own),
+            size * spare,
+            "mm",
+            self._pose(poses),
+            proven,
         )
         ratio = self.terms.ratio
         if math.isfinite(ratio):
@@ -151,8 +157,14 @@ class _Check:
             kept = value <= ratio * (1.0 + CLOSE)
             is_proven = proven and bool((own_ratios <= ratio * (1.0 + 1e-5)).all())
             yield DemandCheck(
-                f"ratio of {LENGTHS[leg]}", kept, value, ratio, ratio - value, "",
-                self._pose(found.limit_poses.at(slice(leg, leg + 1))), kept and is_proven,
+                f"ratio of {LENGTHS[leg]}",
+                kept,
+                value,
+                ratio,
+                ratio - value,
+                "",
+                self._pose(found.limit_poses.at(slice(leg, leg + 1))),
+                kept and is_proven,
             )
         longest = self.terms.requirement.legs.longest_mm
         if longest is not None:
@@ -160,8 +172,14 @@ class _Check:
             value = size * float(used[leg, 1])
             kept = value <= longest * (1.0 + CLOSE)
             yield DemandCheck(
-                f"longest leg ({LENGTHS[leg]})", kept, value, longest, longest - value, "mm",
-                self._pose(found.limit_poses.at(slice(leg, leg + 1))), kept and proven,
+                f"longest leg ({LENGTHS[leg]})",
+                kept,
+                value,
+                longest,
+                longest - value,
+                "mm",
+                self._pose(found.limit_poses.at(slice(leg, leg + 1))),
+                kept and proven,
             )
 
     def _worst_limit(self, kind: str) -> _Worst:
@@ -175,40 +193,13 @@ class _Check:
     def _worst_demand(self, kind: str) -> _Worst:
         found = self.found
         rows = [i for i, name in enumerate(self.names) if name.startswith(kind)]
-        missed, poses = found.missed_demands.copy(), found.demand_poses
         proven = bool(found.demands[rows].all())
-        if not proven:
-            places = self._random_places()
-            amounts = self._amounts()
-            worst = amounts.argmax(axis=0)
-            for row in rows:
-                if amounts[worst[row], row] > missed[row]:
-                    missed[row] = amounts[worst[row], row]
-                    at = poses_of(places[worst[row]][None])
-                    poses = BoxPoses(poses.places.copy(), poses.tilts.copy())
-                    poses.places[row], poses.tilts[row] = at.places[0], at.tilts[0]
+        missed, poses = found.missed_demands, found.demand_poses
         row = max(rows, key=lambda i: missed[i])
         name = self.names[row].split(maxsplit=1)[-1]
         if kind == "clearance":
             name = pair_name(PAIRS[row])
         return _Worst(float(missed[row]), name, poses.at(slice(row, row + 1)), proven)
-
-    def _random_places(self) -> FloatArray:
-        random = np.random.default_rng(0)
-        places = random.uniform(-1.0, 1.0, (RANDOM_POSES, 5))
-        # Half of the positions are on faces of the box.
-        places[::2, :3] = np.sign(places[::2, :3]) * np.minimum(1.0, 2.0 * np.abs(places[::2, :3]))
-        places[:, 3] *= math.pi
-        places[:, 4] = self.terms.tilt * np.sqrt(np.abs(places[:, 4]))
-        places[::2, 4] = self.terms.tilt
-        return places
-
-    def _amounts(self) -> FloatArray:
-        if self._random is None:
-            with np.errstate(all="ignore"):
-                found = missed_amounts(self.x, self.terms, poses_of(self._random_places()))
-            self._random = np.where(np.isnan(found), np.inf, found)
-        return self._random
 
     def _row(
         self, worst: _Worst, limit: float, unit: str, name: str, side: float, factor: float
@@ -216,10 +207,17 @@ class _Check:
         """Return a demand from the amount by which it is missed, times a factor in its unit."""
         missed = factor * worst.missed
         kept = worst.missed <= 1e-6
-        remark = "" if worst.proven or not kept else f"no violation in {RANDOM_POSES} poses"
+        remark = "" if worst.proven or not kept else f"no violation in {SAMPLES} poses"
         return DemandCheck(
-            name, kept, limit + side * missed, limit, -missed, unit, self._pose(worst.poses),
-            worst.proven and kept, remark,
+            name,
+            kept,
+            limit + side * missed,
+            limit,
+            -missed,
+            unit,
+            self._pose(worst.poses),
+            worst.proven and kept,
+            remark,
         )
 
     def _swing(self) -> DemandCheck:
@@ -233,8 +231,14 @@ class _Check:
         value = float(angles[joint])
         kept = value <= limit * (1.0 + CLOSE)
         return DemandCheck(
-            f"swing at {SWINGS[joint]}", kept, value, limit, limit - value, "°",
-            self._pose(poses.at(slice(joint, joint + 1))), kept and bool(found.limits[rows].all()),
+            f"swing at {SWINGS[joint]}",
+            kept,
+            value,
+            limit,
+            limit - value,
+            "°",
+            self._pose(poses.at(slice(joint, joint + 1))),
+            kept and bool(found.limits[rows].all()),
         )
 
     def _hull(self, limit: float) -> DemandCheck:
@@ -246,7 +250,9 @@ class _Check:
         poses = BoxPoses(np.tile(CORNERS, (len(vectors), 1)), np.repeat(vectors, 8, axis=0))
         at = terms.values(self.x, poses)
         arms = float(max(abs(self.x[m.B1X : m.HX]).max(), abs(self.x[m.TX : m.TILT]).max()))
-        bend = (tilts[-1] / 6.0) ** 2 + step**2 * (math.sin(terms.tilt) + 2.0 - 2.0 * math.cos(terms.tilt))
+        bend = (tilts[-1] / 6.0) ** 2 + step**2 * (
+            math.sin(terms.tilt) + 2.0 - 2.0 * math.cos(terms.tilt)
+        )
         error = 0.125 * 4.0 * bend * arms if terms.tilt else 0.0
         axes = [np.stack([end[axis] + 0.0 * at.p[0] for end in at.ends]) for axis in range(3)]
         base = [(0.0, self.x[m.A3X]), (0.0, self.x[m.A3Y]), (0.0, 0.0)]
@@ -258,8 +264,15 @@ class _Check:
         most = value + 2.0 * terms.scale_mm * error
         kept = value <= limit
         return DemandCheck(
-            f"outer size along {'xyz'[int(np.argmax(edges))]}", kept, value, limit, limit - value,
-            "mm", None, most <= limit, "",
+            f"outer size along {'xyz'[int(np.argmax(edges))]}",
+            kept,
+            value,
+            limit,
+            limit - value,
+            "mm",
+            None,
+            most <= limit,
+            "",
         )
 
     def _move(self, limit: float) -> DemandCheck:
@@ -280,13 +293,10 @@ class _Check:
             times.append(law.duration)
         value = max(times)
         kept = value <= limit
-        return DemandCheck(
-            "time of a move", kept, value, limit, limit - value, "s", None, kept, ""
-        )
+        return DemandCheck("time of a move", kept, value, limit, limit - value, "s", None, kept, "")
 
     def _pose(self, poses: BoxPoses) -> Pose:
         """Return the pose of b4 in design units at a place of the box."""
         tool, rotation = self.terms.tool_at(self.x, poses)
         offset = tool_offset(rotation[0], self.design.tool.position)
         return Pose.of(tool[0] / self.design.unit_mm - offset, rotation[0])
-

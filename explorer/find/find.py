@@ -15,15 +15,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from explorer.find import machine_values as m
 from explorer.find.answers import FoundDesign, FoundDesigns, Relaxation
+from explorer.find.bound import impossible_demands, least_longest_mm
 from explorer.find.candidates import candidates, standard_poses
 from explorer.find.certificate import Certificate, certify, is_regular
-
-from explorer.find.improvement import Improvement, free_variables
-from explorer.find.machine_values import HOME
-from explorer.find.bound import impossible_demands, least_longest_mm
 from explorer.find.check import check_machine
+from explorer.find.improvement import Improvement, free_variables
+from explorer.find.machine_values import BoxPoses
 from explorer.find.nearest import nearest_values, relaxable_fields
 from explorer.find.over_poses import demand_names
 from explorer.find.over_tilts import limit_names
@@ -53,19 +51,21 @@ CROSSED = 0.7
 SHAKES = (0.02, 0.06, 0.15)
 
 OTHER_KINDS: tuple[Preference, ...] = (
-    "balanced", "small", "far-from-singular", "easy-to-build", "little-force", "precise", "stiff",
+    *("balanced", "small", "far-from-singular", "easy-to-build"),
+    *("little-force", "precise", "stiff"),
 )
 """The kinds of further answers, in their order."""
 
 
 @dataclass
 class Machine:
-    """A machine that keeps a requirement: its row, its certificate and its cost of a kind."""
+    """A machine that keeps a requirement: its row, its certificate its cost of a kind, and poses."""
 
     x: FloatArray
     certificate: Certificate
     cost: float
     kind: Preference
+    poses: BoxPoses
 
 
 @dataclass
@@ -122,7 +122,9 @@ class Search:
         self.best[found.kind] = found
         return True
 
-    def _starts(self, start: FloatArray | None) -> Iterator[tuple[FloatArray, Preference] | Machine]:
+    def _starts(
+        self, start: FloatArray | None
+    ) -> Iterator[tuple[FloatArray, Preference] | Machine]:
         """Yield kinds and machines to improve, without an end."""
         random = np.random.default_rng(self.seed + 1)
         if start is not None:
@@ -138,9 +140,9 @@ class Search:
                     self.spend(CERTIFICATE_UNITS)
                     certificate = certify(x[row], self.terms, cells=CELLS)
                     if certificate.is_kept:
-                        search = Improvement(self.terms, self.kinds[0], x[row])
-                        cost = search.cost(standard_poses(self.terms.tilt))
-                        yield Machine(x[row], certificate, cost, self.kinds[0])
+                        poses = standard_poses(self.terms.tilt)
+                        cost = Improvement(self.terms, self.kinds[0], x[row]).cost(poses)
+                        yield Machine(x[row], certificate, cost, self.kinds[0], poses)
                         break
             score = np.log(large) + 4.0 * np.maximum(missed, 0.0)
             order = np.argsort(score)[: IMPROVED if first else IMPROVED // 2]
@@ -149,7 +151,9 @@ class Search:
             first = False
             for kind in self.kinds:
                 if self.best:
-                    best = self.best.get(kind) or min(self.best.values(), key=lambda each: each.cost)
+                    best = self.best.get(kind) or min(
+                        self.best.values(), key=lambda each: each.cost
+                    )
                     yield best.x if kind not in self.best else self._shake(best.x, random), kind
             if self.kinds[0] in self.best:
                 for _ in SHAKES:
@@ -164,8 +168,13 @@ class Search:
     def improve(self, x: FloatArray, kind: Preference) -> Machine | None:
         """Return the machine after an improvement, certified; None if it misses a demand."""
         poses = standard_poses(self.terms.tilt)
-        poses = poses.plus(certify(x, self.terms, is_quick=True, cells=64).worst_poses)
+        return self._improve(x, kind, certify(x, self.terms, is_quick=True, cells=64), poses)
+
+    def _improve(
+        self, x: FloatArray, kind: Preference, found: Certificate, poses: BoxPoses
+    ) -> Machine | None:
         for _ in range(ROUNDS):
+            poses = poses.plus(found.worst_poses)
             search = Improvement(self.terms, kind, x, lambda: self.spend(EVALUATION_UNITS))
             improved = search.run(poses)
             x = improved.x
@@ -174,13 +183,29 @@ class Search:
             self.spend(CERTIFICATE_UNITS)
             found = certify(x, self.terms, cells=CELLS, is_quick=True)
             if found.is_kept:
-                return Machine(x, found, improved.cost, kind)
+                return Machine(x, found, improved.cost, kind, poses)
             # Legs that cross between the poses stay crossed.
             crossed = found.missed_demands[: len(PAIRS)] > CROSSED * self.terms.distance
             if self.terms.distance > 0.0 and crossed.any():
                 return None
-            poses = poses.plus(found.worst_poses)
         return None
+
+    def finish(self) -> None:
+        """Certify the best machines with more cells; improve those again that miss a demand."""
+        self.units = math.inf
+        for kind, found in list(self.best.items()):
+            last: Machine | None = found
+            while last is not None:
+                certificate = certify(last.x, self.terms, cells=FINAL_CELLS)
+                if certificate.is_kept:
+                    self.best[kind] = replace(last, certificate=certificate)
+                    break
+                try:
+                    last = self._improve(last.x, kind, certificate, last.poses)
+                except Stop:
+                    last = None
+            if last is None:
+                del self.best[kind]
 
 
 def find_designs(
@@ -230,14 +255,15 @@ def find_designs(
     units = UNITS_PER_SECOND * seconds
     search = Search(terms, kinds, units, ends, stop or _never, seed)  # type: ignore[arg-type]
 
-    def so_far(cells: int = 0) -> FoundDesigns:
+    def so_far() -> FoundDesigns:
         found = [search.best[kind] for kind in search.kinds if kind in search.best]
-        designs = tuple(_answer(each, terms, design, cells) for each in found)
+        designs = tuple(_answer(each, terms, design) for each in found)
         binding = () if not found else _binding(found[0], terms)
         return FoundDesigns(designs, bound, (), binding)
 
     search.run(start, lambda: watch(so_far()) if watch else None)
-    found = so_far(FINAL_CELLS)
+    search.finish()
+    found = so_far()
     if found.designs:
         return found
     if search.is_cancelled:
@@ -251,14 +277,16 @@ def _nearest(
     requirement: Requirement, seed: int, seconds: float, stop: Callable[[], bool]
 ) -> tuple[Relaxation, ...]:
     """Return the nearest values of the demands that can be relaxed, some seconds each."""
-    fields, found = relaxable_fields(requirement), list[Relaxation]()
-    for field in fields:
+    found: list[Relaxation] = []
+    for name in relaxable_fields(requirement):
         last: list[FloatArray] = []
 
         def keeps(relaxed: Requirement, last: list[FloatArray] = last) -> bool:
             units = UNITS_PER_SECOND * min(seconds, RELAXED_SECONDS)
             ends = time.perf_counter() + PATIENCE * min(seconds, RELAXED_SECONDS)
-            search = Search(Terms.of(relaxed), ("small",), units, ends, stop, seed, is_first_enough=True)
+            search = Search(
+                Terms.of(relaxed), ("small",), units, ends, stop, seed, is_first_enough=True
+            )
             if impossible_demands(relaxed):
                 return False
             search.run(last[-1] if last else None, lambda: None)
@@ -268,7 +296,7 @@ def _nearest(
 
         if stop():
             break
-        found += nearest_values(requirement, [field], keeps)
+        found += nearest_values(requirement, [name], keeps)
     return tuple(found)
 
 
@@ -276,11 +304,9 @@ def _never() -> bool:
     return False
 
 
-def _answer(found: Machine, terms: Terms, base: Design | None, cells: int) -> FoundDesign:
-    """Return a machine as a design with its check; its proof is tried again with more cells."""
+def _answer(found: Machine, terms: Terms, base: Design | None) -> FoundDesign:
+    """Return a machine as a design with its check."""
     certificate = found.certificate
-    if cells and not certificate.is_proven:
-        certificate = certify(found.x, terms, cells=cells)
     name = f"{terms.requirement.name} {found.kind}"
     design = design_of(found.x, terms, certificate.ranges, name, base)
     poses = standard_poses(terms.tilt).plus(certificate.limit_poses).plus(certificate.demand_poses)

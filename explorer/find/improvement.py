@@ -117,7 +117,7 @@ class Improvement:
             cosine = math.cos(terms.swing) + RESERVE
             rows += [each - cosine for each in at.swings(home)]
         if terms.distance > 0.0:
-            rows += [each - terms.distance * (1.0 + 20.0 * RESERVE) for each in at.distances]
+            rows += [each - terms.distance * (1.0 + 100.0 * RESERVE) for each in at.distances]
         rows += self._machine(at)
         rows += self._preferred(at, bounds.T[5:, :, None])
         shape = (len(x), len(poses.places))
@@ -126,7 +126,7 @@ class Improvement:
     def _machine(self, at: m.MachineValues) -> list[FloatArray]:
         """Return the slacks of forces, speeds, transmission, error and deflection."""
         terms, rows = self.terms, list[FloatArray]()
-        keeps = 1.0 - 50.0 * RESERVE
+        keeps = 1.0 - 200.0 * RESERVE
         if math.isfinite(terms.push) and (terms.force or terms.weight.any()):
             weight, centre = (tuple(each) for each in (terms.weight, terms.centre))
             for held, speed in zip(at.weight_forces(weight, centre), at.tool_speeds, strict=True):
@@ -201,7 +201,9 @@ class Improvement:
         for turn in range(rounds):
             slacks = self.table(x[None], poses, bounds[None])[0]
             order = np.argsort(slacks, axis=1)[:, :LOOKS]
-            pairs = np.column_stack([np.repeat(np.arange(len(slacks)), order.shape[1]), order.ravel()])
+            pairs = np.column_stack(
+                [np.repeat(np.arange(len(slacks)), order.shape[1]), order.ravel()]
+            )
             chosen = np.unique(np.concatenate([chosen, pairs]), axis=0)
             used, places = np.unique(chosen[:, 1], return_inverse=True)
             rows, looked = (chosen[:, 0], places), poses.at(used)

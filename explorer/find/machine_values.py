@@ -99,16 +99,18 @@ class MachineValues:
     """
 
     def __init__(self, x: FloatArray, edges: FloatArray, poses: BoxPoses) -> None:
-        self.poses, self.edges, self.x = poses, edges, [column[..., None] for column in np.moveaxis(x, -1, 0)]
+        self.poses, self.edges, self.x = (
+            poses,
+            edges,
+            [column[..., None] for column in np.moveaxis(x, -1, 0)],
+        )
         x = self.x
         along = (0.5 * edges * poses.places).T
         c, s = np.cos(x[BOX_YAW]), np.sin(x[BOX_YAW])
         offset: Vec = along[0] * c - along[1] * s, along[0] * s + along[1] * c, along[2]
         self.tool = plus((x[HX], x[HY], x[HZ]), times(x[SIZE], offset))
         size = np.sqrt((poses.tilts**2).sum(axis=-1))
-        azimuth = np.divide(
-            poses.tilts.T, size, out=np.zeros_like(poses.tilts.T), where=size > 0.0
-        )
+        azimuth = np.divide(poses.tilts.T, size, out=np.zeros_like(poses.tilts.T), where=size > 0.0)
         self._axis: Vec = azimuth[0], azimuth[1], 0.0
         self._cos, self._sin = np.cos(x[TILT] * size), np.sin(x[TILT] * size)
         self.home_axes = _axes(x)
@@ -164,7 +166,9 @@ class MachineValues:
         cosines = [found[0] / norms[0], found[1] / norms[3]]
         axes, own = (self.u, self.v, self.w), self.home_axes
         for leg, at_home, size in zip(self.legs, home.legs, norms, strict=True):
-            parts = [dot(axis, leg) * dot(mine, at_home) for axis, mine in zip(axes, own, strict=True)]
+            parts = [
+                dot(axis, leg) * dot(mine, at_home) for axis, mine in zip(axes, own, strict=True)
+            ]
             cosines.append((parts[0] + parts[1] + parts[2]) / size)
         return cosines
 
@@ -234,9 +238,7 @@ class MachineValues:
         joints = [self.ends[0], self.ends[1], self.ends[1], self.ends[2], self.ends[2], self.p]
         return [
             plus(velocity, cross(turning, minus(joint, self.tool)))
-            for velocity, turning, joint in zip(
-                self.velocities, self.turnings, joints, strict=True
-            )
+            for velocity, turning, joint in zip(self.velocities, self.turnings, joints, strict=True)
         ]
 
 

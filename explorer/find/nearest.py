@@ -77,7 +77,9 @@ def relaxed(requirement: Requirement, field: str, factor: float) -> Requirement 
             return msgspec.structs.replace(requirement, box_mm=value)
         shrinks = field in ("tilt_deg", "legs.apart_mm")
         value = _three_digits(own / factor if shrinks else own * factor, up=not shrinks)
-        if field == "swing_deg" and value > MOST_SWING or field == "tilt_deg" and value > MOST_TILT:
+        if (field == "swing_deg" and value > MOST_SWING) or (
+            field == "tilt_deg" and value > MOST_TILT
+        ):
             return None
         if not tail:
             return msgspec.structs.replace(requirement, **{field: value})

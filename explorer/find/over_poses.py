@@ -14,6 +14,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ from explorer.numerics.cells import CellValues, largest_values
 
 # Cells of poses that a proof may take, and of them at once.
 MOST_CELLS = 40_000
+# Random poses about each of the worst, and their distances over the whole ranges.
+NEAR, NARROWER = 100, (0.1, 0.03, 0.01, 0.003, 0.001)
 # Signs of errors, up to a common one.
 SIGNS = np.array([*itertools.product((1.0, -1.0), repeat=5)])
 # The joints' points by the actuators: b1, b2, b2, b3, b3, b4.
@@ -63,13 +66,20 @@ def missed_amounts(x: FloatArray, terms: Terms, poses: BoxPoses) -> FloatArray:
 def prove_demands(x: FloatArray, terms: Terms, cells: int | None = None) -> CellValues:
     """Return by how much each of `demand_names` is missed at most over all poses.
 
-    Places are three in the box, an azimuth and a tilt. At most some number of cells is looked at.
+    Places are three in the box, an azimuth and a tilt. At most some number of cells is looked at
+    for the clearances, and for all else.
     """
+    clear = replace(terms, push=math.inf, speed=math.inf, transmission=0.0)
+    clear = replace(clear, error=math.inf, deflection=math.inf)
+    parts = [_prove(x, each, cells or MOST_CELLS) for each in (clear, replace(terms, distance=0.0))]
+    return CellValues(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _prove(x: FloatArray, terms: Terms, cells: int) -> CellValues:
     over = _OverPoses(x, terms)
     if not over.kinds:
         return CellValues(np.zeros(0), np.zeros((0, 5)), np.zeros(0))
-    lows = np.array([-1.0, -1.0, -1.0, -math.pi, 0.0])
-    highs = np.array([1.0, 1.0, 1.0, math.pi, terms.tilt])
+    lows, highs = ends_of(terms)
     arm = float(np.abs(x[m.B1X : m.HX]).max())
     scales = np.array([*0.5 * terms.edges, math.sin(terms.tilt) * arm, arm])
 
@@ -79,9 +89,41 @@ def prove_demands(x: FloatArray, terms: Terms, cells: int | None = None) -> Cell
         places = np.broadcast_to(middle[:, None], (*values.shape, 5))
         return CellValues(values, places, bounds)
 
-    return largest_values(
-        measure, lows, highs, most=cells or MOST_CELLS, scales=scales, resolves=False
+    return largest_values(measure, lows, highs, most=cells, scales=scales, resolves=False)
+
+
+def ends_of(terms: Terms) -> tuple[FloatArray, FloatArray]:
+    """Return the lows and highs of the five coordinates of poses."""
+    lows = np.array([-1.0, -1.0, -1.0, -math.pi, 0.0])
+    return lows, np.array([1.0, 1.0, 1.0, math.pi, terms.tilt])
+
+
+def sample_demands(x: FloatArray, terms: Terms, count: int) -> CellValues:
+    """Return by how much demands are missed at most in random poses, and near the worst of them.
+
+    The bounds are the values. Half of the poses are on faces of the box, at the largest tilt.
+    """
+    random, over = np.random.default_rng(0), _OverPoses(x, terms)
+    lows, highs = ends_of(terms)
+    places = random.uniform(lows, highs, (count, 5))
+    places[::2, :3] = np.clip(2.0 * places[::2, :3], -1.0, 1.0)
+    places[::2, 4] = terms.tilt
+    names = demand_names(terms)
+    found = CellValues(
+        np.full(len(names), -np.inf), np.zeros((len(names), 5)), np.zeros(len(names))
     )
+    for width in (0.0, *NARROWER):
+        if width:
+            centres = np.repeat(found.places, NEAR, axis=0)
+            places = centres + width * (highs - lows) * random.normal(size=centres.shape)
+            places = np.clip(places, lows, highs)
+        values = np.nan_to_num(over.at(poses_of(places))[0], nan=np.inf)
+        rows = values.argmax(axis=0)
+        best, more = values.max(axis=0), places[rows]
+        is_more = best > found.values
+        kept = np.where(is_more, best, found.values)
+        found = CellValues(kept, np.where(is_more[:, None], more, found.places), kept)
+    return found
 
 
 def poses_of(places: FloatArray) -> BoxPoses:
@@ -127,7 +169,11 @@ class _OverPoses:
         terms, found = self.terms, list[Any]()
         if "clearance" in self.kinds:
             # Over cells the clearances are bounded in another way.
-            found += [terms.distance - each for each in at.distances] if most is np.asarray else [0.0] * 6
+            found += (
+                [terms.distance - each for each in at.distances]
+                if most is np.asarray
+                else [0.0] * 6
+            )
         weight: m.Vec = tuple(terms.weight.tolist())
         needs = self.kinds & {"force", "deflection"}
         held = at.weight_forces(weight, tuple(terms.centre.tolist())) if needs else []
@@ -135,12 +181,18 @@ class _OverPoses:
         if "force" in self.kinds:
             for own, speed in zip(held, speeds, strict=True):
                 push = (most(own) + terms.force * speed) / terms.push
-                found.append(np.maximum(push, (most(-own) + terms.force * speed) / terms.pull) - 1.0)
+                found.append(
+                    np.maximum(push, (most(-own) + terms.force * speed) / terms.pull) - 1.0
+                )
         if "speed" in self.kinds:
             x_axis: m.Vec = (1.0, 0.0, 0.0)
             for joint, point in enumerate(POINTS):
                 arm = m.minus(at.ends[point], at.tool)
-                along = x_axis if joint in GUIDE_ROWS else m.times(1.0 / at.lengths[point], at.legs[point])
+                along = (
+                    x_axis
+                    if joint in GUIDE_ROWS
+                    else m.times(1.0 / at.lengths[point], at.legs[point])
+                )
                 lever = length(m.cross(arm, along))
                 found.append((terms.velocity + terms.turning * lever) / terms.speed - 1.0)
         if "transmission" in self.kinds:
@@ -153,7 +205,10 @@ class _OverPoses:
             found.append(terms.actuator_error * worst / terms.error - 1.0)
         if "deflection" in self.kinds:
             sizes = [np.maximum(most(own), most(-own)) for own in held]
-            bends = [speed * (size + terms.force * speed) for speed, size in zip(speeds, sizes, strict=True)]
+            bends = [
+                speed * (size + terms.force * speed)
+                for speed, size in zip(speeds, sizes, strict=True)
+            ]
             found.append(terms.flexibility * np.sum(bends, axis=0) / terms.deflection - 1.0)
         return found
 
@@ -195,7 +250,10 @@ class MachineOverCells(MachineValues):
         def axis(column: m.Vec) -> m.Vec:
             v = _rows(column, k)
             slopes = np.zeros((k, 3, 5))
-            slopes[:, :, 3], slopes[:, :, 4] = b[:, None] * np.cross(around, v), a[:, None] * np.cross(turn, v)
+            slopes[:, :, 3], slopes[:, :, 4] = (
+                b[:, None] * np.cross(around, v),
+                a[:, None] * np.cross(turn, v),
+            )
             x, y, z = (Affine(v[:, i], slopes[:, i], bends) for i in range(3))
             return x, y, z
 
@@ -211,26 +269,32 @@ class MachineOverCells(MachineValues):
         self.tool = x_, y_, z_
         self.p = m.minus(self.tool, self.of_platform((x[m.TX], x[m.TY], x[m.TZ])))
 
+    def _base(self, leg: int) -> m.Vec:
+        """Return the base end of a leg, 0 to 3."""
+        if leg in (0, 3):
+            return (self.x[m.A3X], self.x[m.A3Y], 0.0) if leg else (0.0, 0.0, 0.0)
+        return self.ends[leg][0], 0.0, 0.0
+
     def least_distance(self, at: MachineValues, first: int, second: int) -> FloatArray:
         """Return lower bounds of the distance of two legs, 1 to 4, shape (k,)."""
         i, j = first - 1, second - 1
         k = len(at.poses.places)
-        ends = [(m.minus(self.ends[leg], self.legs[leg]), self.ends[leg]) for leg in (i, j)]
+        ends = [(self._base(leg), self.ends[leg]) for leg in (i, j)]
         (a, p), (b, q) = ([_centres(each, k) for each in pair] for pair in ends)
         (da, dp), (db, dq) = ([_slopes(each, k) for each in pair] for pair in ends)
         u, v = p - a, q - b
         s, t = m.closest_shares(u.T, v.T, (a - b).T)
         n = a + s[:, None] * u - b - t[:, None] * v
-        distance = lengths_of(n)
-        n = n / np.maximum(distance, 1e-300)[:, None]
+        n = n / np.maximum(lengths_of(n), 1e-300)[:, None]
         turn = _normal_rates(n, u, dp - da, v, dq - db, s, t)
         x, y, z = (Affine(n[:, axis], turn[:, axis], np.zeros(k)) for axis in range(3))
-        apart = [m.dot((x, y, z), m.minus(e, o)).lower for e in ends[0] for o in ends[1]]
+        apart = [
+            np.broadcast_to(m.dot((x, y, z), m.minus(end, other)).lower, (k,))
+            for end in ends[0]
+            for other in ends[1]
+        ]
         least = np.min(apart, axis=0)
-        bound = np.where(least > 0.0, least / largest_norm(x, y, z), 0.0)
-        # Distances change by no more than the ends move.
-        moves = [[largest_norm(*_centred(e)) for e in pair] for pair in ends]
-        return np.maximum(bound, distance - np.max(moves[0], axis=0) - np.max(moves[1], axis=0))
+        return np.where(least > 0.0, least / largest_norm(x, y, z), 0.0)
 
 
 def _centres(vector: m.Vec, count: int) -> FloatArray:
@@ -240,15 +304,6 @@ def _centres(vector: m.Vec, count: int) -> FloatArray:
 def _slopes(vector: m.Vec, count: int) -> FloatArray:
     none = np.zeros((count, 5))
     return np.stack([getattr(each, "slopes", none) for each in vector], axis=1)
-
-
-def _centred(vector: m.Vec) -> list[Affine]:
-    """Return a vector less its centre."""
-    n = max(len(each.centre) for each in vector if isinstance(each, Affine)) if any(
-        isinstance(each, Affine) for each in vector
-    ) else 1
-    none = Affine(np.zeros(n), np.zeros((n, 5)), np.zeros(n))
-    return [each - each.centre if isinstance(each, Affine) else none for each in vector]
 
 
 def _normal_rates(
@@ -265,7 +320,7 @@ def _normal_rates(
     A segment counts if its closest point, at s or t, lies in its interior.
     """
     f, g = -np.einsum("ki,kic->kc", n, du), -np.einsum("ki,kic->kc", n, dv)
-    inner_u, inner_v = ((0.0 < each) & (each < 1.0) for each in (s, t))
+    inner_u, inner_v = ((each > 0.0) & (each < 1.0) for each in (s, t))
     uu, vv, uv = dot(u, u), dot(v, v), dot(u, v)
     determinant = uu * vv - uv * uv
     both = inner_u & inner_v & (determinant > 1e-9 * uu * vv)

@@ -157,8 +157,13 @@ class _OverTilts:
         c, s = math.cos(self.x[m.BOX_YAW]), math.sin(self.x[m.BOX_YAW])
         turned = found[:, [0, 3]]
         found[:, 0::3] = np.stack(
-            [c * turned[..., 0] + s * turned[..., 1], c * turned[..., 1] - s * turned[..., 0],
-             turned[..., 2]], axis=-1)
+            [
+                c * turned[..., 0] + s * turned[..., 1],
+                c * turned[..., 1] - s * turned[..., 0],
+                turned[..., 2],
+            ],
+            axis=-1,
+        )
         found[:, 1:3, 0] = 0.0
         return found.reshape(*tilts.shape[:-1], 4, 3)
 
@@ -193,6 +198,10 @@ class _OverTilts:
         shadow = self._halves[1]
         y, z = np.clip(apexes[:, 1:3, 1], -shadow[1], shadow[1]), apexes[:, 1:3, 2]
         share = np.where(np.abs(y) < shadow[1], y / shadow[1], toward)
-        ends = [share * np.sign(s or 1.0), share * np.sign(c or 1.0), np.clip(z / half[2], -1.0, 1.0)]
+        ends = [
+            share * np.sign(s or 1.0),
+            share * np.sign(c or 1.0),
+            np.clip(z / half[2], -1.0, 1.0),
+        ]
         apexes[:, 1:3] = np.stack(ends, axis=-1) * half
         return np.clip(apexes / half, -1.0, 1.0)

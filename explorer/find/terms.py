@@ -161,7 +161,10 @@ def design_of(
     swing = Swing(*(requirement.swing_deg,) * 6)
     radius = 0.5 * legs.diameter_mm / unit
     limits = Limits(
-        **{name: (low, high) for name, (low, high) in zip(LENGTHS, (scale * ranges).tolist(), strict=True)},
+        **{
+            name: (low, high)
+            for name, (low, high) in zip(LENGTHS, (scale * ranges).tolist(), strict=True)
+        },
         margin=requirement.least_margin_mm / unit,
         leg_radii=(radius,) * 4,
         swing=swing,
