@@ -58,7 +58,7 @@ def misses(terms: Terms, at: MachineValues, home: MachineValues) -> tuple[FloatA
         swing = np.arccos(np.clip(cosine, -1.0, 1.0))
         found.append(swing / terms.swing - 1.0)
     if terms.distance > 0.0:
-        near = np.min([each.min(axis=1) for each in at.distances], axis=0)
+        near = np.min([each.min(axis=1) for each in at.uncrossed_distances(home)], axis=0)
         found.append(1.0 - near / terms.distance)
     return np.max(found, axis=0), large
 

@@ -18,7 +18,7 @@ import numpy as np
 from explorer.find.answers import FoundDesign, FoundDesigns, Relaxation
 from explorer.find.bound import impossible_demands, least_longest_mm
 from explorer.find.candidates import candidates, standard_poses
-from explorer.find.certificate import Certificate, certify, is_regular
+from explorer.find.certificate import Certificate, certify, is_regular, lengths_over
 from explorer.find.check import check_machine
 from explorer.find.improvement import Improvement, free_variables
 from explorer.find.machine_values import BoxPoses
@@ -168,7 +168,9 @@ class Search:
     def improve(self, x: FloatArray, kind: Preference) -> Machine | None:
         """Return the machine after an improvement, certified; None if it misses a demand."""
         poses = standard_poses(self.terms.tilt)
-        return self._improve(x, kind, certify(x, self.terms, is_quick=True, cells=64), poses)
+        ranges = lengths_over(x, self.terms, poses)
+        first = certify(x, self.terms, ranges=ranges, is_quick=True, cells=64)
+        return self._improve(x, kind, first, poses)
 
     def _improve(
         self, x: FloatArray, kind: Preference, found: Certificate, poses: BoxPoses
@@ -181,7 +183,7 @@ class Search:
             if improved.missed > 1e-5 or not is_regular(x):
                 return None
             self.spend(CERTIFICATE_UNITS)
-            found = certify(x, self.terms, cells=CELLS, is_quick=True)
+            found = certify(x, self.terms, cells=CELLS, poses=poses, is_quick=True)
             if found.is_kept:
                 return Machine(x, found, improved.cost, kind, poses)
             # Legs that cross between the poses stay crossed.

@@ -6,11 +6,11 @@ preference lowers: they stay beyond all values at the poses, which keeps the fun
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from explorer.find.requirement import Preference
 from explorer.find.terms import Terms
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.search import one_thread
-from explorer.optimise.search.sqp import Point, Stop, slsqp
+from explorer.optimise.search.sqp import Point, slsqp
 
 # Imaginary step: far below rounding, so that derivatives have no error of their own.
 STEP = 1e-40
@@ -93,7 +93,6 @@ class Improvement:
         self.start, self.sides = start, sides_of(start, terms)
         self.free, self._before_each = free_variables(terms), before_each
         self.extra = [each for each in self.weights if each != LENGTH]
-        self.evaluations = 0
 
     def table(self, x: FloatArray, poses: BoxPoses, bounds: FloatArray) -> FloatArray:
         """Return the slacks of machines (n, 18) in poses, shape (n, demands, k).
@@ -117,7 +116,7 @@ class Improvement:
             cosine = math.cos(terms.swing) + RESERVE
             rows += [each - cosine for each in at.swings(home)]
         if terms.distance > 0.0:
-            rows += [each - terms.distance * (1.0 + 100.0 * RESERVE) for each in at.distances]
+            rows += [each - terms.distance * (1.0 + 100.0 * RESERVE) for each in at.uncrossed_distances(home)]
         rows += self._machine(at)
         rows += self._preferred(at, bounds.T[5:, :, None])
         shape = (len(x), len(poses.places))
@@ -190,57 +189,77 @@ class Improvement:
             start += count
         return found
 
-    def run(self, poses: BoxPoses, *, most: int = 12, rounds: int = 12) -> Improved:
-        """Return the machine after the solver's steps, and what it still misses at the poses."""
-        x, free = self.start.copy(), self.free
-        n = len(free)
+    def run(self, poses: BoxPoses, *, rounds: int = 20) -> Improved:
+        """Return the machine after the solver's rounds, and what it still misses at the poses.
+
+        A round that neither lowers the cost nor what is missed is taken back, and the next one goes
+        less far.
+        """
+        x, trusted = self.start.copy(), TRUSTED
         bounds = self._first_bounds(x, poses)
-        chosen = np.zeros((0, 2), dtype=np.int64)
-        lows, highs = _ranges(self, x)
-        cost = math.inf
+        missed, cost = self.missed(x, poses, bounds), self._cost(bounds)
+        rows = self._worst_rows(x, poses, bounds)
         for turn in range(rounds):
+            new_x, new_bounds = self._step(x, bounds, poses, rows, trusted)
+            new_missed, new_cost = self.missed(new_x, poses, new_bounds), self._cost(new_bounds)
+            gain = cost - new_cost + COST_OF_MISSES * (missed - new_missed)
+            if gain > 0.0:
+                x, bounds, missed, cost = new_x, new_bounds, new_missed, new_cost
+                trusted = min(TRUSTED, 1.5 * trusted)
+            else:
+                trusted *= 0.5
+            more = self._worst_rows(new_x, poses, new_bounds)
+            rows = np.unique(np.concatenate([rows, more]), axis=0)
+            if missed <= FEASIBLE and 0.0 < gain < SETTLED:
+                break
+            if trusted < LEAST_TRUSTED or (turn >= PATIENCE and missed > HOPELESS):
+                break
+        return Improved(x, missed, cost)
+
+    def _worst_rows(self, x: FloatArray, poses: BoxPoses, bounds: FloatArray) -> Any:
+        """Return pairs of each demand and a pose where it has least to spare, shape (r, 2)."""
+        with np.errstate(all="ignore"):
             slacks = self.table(x[None], poses, bounds[None])[0]
-            order = np.argsort(slacks, axis=1)[:, :LOOKS]
-            pairs = np.column_stack(
-                [np.repeat(np.arange(len(slacks)), order.shape[1]), order.ravel()]
+        order = np.argsort(slacks, axis=1)[:, :LOOKS]
+        return np.column_stack([np.repeat(np.arange(len(slacks)), LOOKS), order.ravel()])
+
+    def _step(
+        self, x: FloatArray, bounds: FloatArray, poses: BoxPoses, rows: Any, trusted: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return a machine and its bounds after one run of the solver, within a trusted change.
+
+        The rows (r, 2) are pairs of a demand and of a pose, at which it is looked at.
+        """
+        free, n = self.free, len(self.free)
+        used, places = np.unique(rows[:, 1], return_inverse=True)
+        looked = poses.at(used)
+        steps = 1j * STEP * np.eye(n + len(bounds))
+
+        def evaluate(y: FloatArray) -> Point:
+            self._before_each()
+            given = np.concatenate([y[None] + 0j, y + steps])
+            machines = np.repeat(x[None] + 0j, len(given), axis=0)
+            machines[:, free] = given[:, :n]
+            table = self.table(machines, looked, given[:, n:])[:, rows[:, 0], places]
+            slope = np.zeros(len(y))
+            slope[n + 4] = self.weights[LENGTH] / y[n + 4]
+            slope[n + 5 :] = [self.weights[kind] for kind in self.extra]
+            return self._cost(y[n:]), slope, table[0].real, (table[1:].imag / STEP).T
+
+        y = np.concatenate([x[free], bounds])
+        near = np.full(len(y), math.inf)
+        near[:n] = trusted
+        lows, highs = _ranges(self, self.start)
+        ends = np.column_stack([np.maximum(lows, y - near), np.minimum(highs, y + near)])
+        equal = np.zeros(len(rows), dtype=bool)
+        with np.errstate(all="ignore"), one_thread():
+            found = slsqp(
+                evaluate, lambda *_: None, y, ends, equal, most=STEPS, precision=PRECISION
             )
-            chosen = np.unique(np.concatenate([chosen, pairs]), axis=0)
-            used, places = np.unique(chosen[:, 1], return_inverse=True)
-            rows, looked = (chosen[:, 0], places), poses.at(used)
-            steps = 1j * STEP * np.eye(n + len(bounds))
-
-            def evaluate(y: FloatArray) -> Point:
-                self._before_each()
-                self.evaluations += 1
-                given = np.concatenate([y[None] + 0j, y + steps])
-                machines = np.repeat(x[None] + 0j, len(given), axis=0)
-                machines[:, free] = given[:, :n]
-                table = self.table(machines, looked, given[:, n:])[:, *rows]
-                slope = np.zeros(len(y))
-                slope[n + 4] = self.weights[LENGTH] / y[n + 4]
-                for index, kind in enumerate(self.extra):
-                    slope[n + 5 + index] = self.weights[kind]
-                return self._cost(y[n:]), slope, table[0].real, (table[1:].imag / STEP).T
-
-            y = np.concatenate([x[free], bounds])
-            before = y
-            with contextlib.suppress(Stop), np.errstate(all="ignore"), one_thread():
-                near = np.full(len(y), math.inf)
-                near[:n] = TRUSTED
-                ends = np.column_stack([np.maximum(lows, y - near), np.minimum(highs, y + near)])
-                equal = np.zeros(len(chosen), dtype=bool)
-                y = slsqp(evaluate, lambda *_: None, y, ends, equal, most=most, precision=PRECISION)
-            if not np.isfinite(y).all():
-                y = before
-            x = x.copy()
-            x[free], bounds = y[:n], y[n:]
-            last, cost = cost, self._cost(bounds)
-            missed = self.missed(x, poses, bounds)
-            if missed <= FEASIBLE and last - cost < SETTLED:
-                break
-            if turn >= PATIENCE and missed > HOPELESS:
-                break
-        return Improved(x, self.missed(x, poses, bounds), self._cost(bounds))
+        y = found if np.isfinite(found).all() else y
+        moved = x.copy()
+        moved[free] = y[:n]
+        return moved, y[n:]
 
     def cost(self, poses: BoxPoses) -> float:
         """Return the cost of the start, with the least bounds that it keeps in poses."""
@@ -258,10 +277,12 @@ class Improvement:
 
 
 # Poses at which each demand is looked at in the beginning, and amount that is no miss.
-LOOKS = 4
+LOOKS = 3
 FEASIBLE = 1e-6
 # Largest change of a variable in a round, and change of the cost that ends the rounds.
-TRUSTED, SETTLED = 0.3, 1e-3
+TRUSTED, LEAST_TRUSTED, SETTLED = 0.3, 2e-3, 1e-3
+# Weight of what is missed beside the cost, and steps of the solver in a round.
+COST_OF_MISSES, STEPS = 30.0, 12
 # Rounds after which a machine that misses a demand by more than this is given up.
 PATIENCE, HOPELESS = 3, 0.02
 

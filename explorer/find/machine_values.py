@@ -175,6 +175,20 @@ class MachineValues:
     @cached_property
     def distances(self) -> list[Any]:
         """The distances of the axes of the six pairs of legs, in the order of `PAIRS`."""
+        return [distance for distance, _ in self._closest]
+
+    def uncrossed_distances(self, home: MachineValues) -> list[Any]:
+        """Return the distances of the pairs, negative where two legs have passed through each other.
+
+        They have if they pass each other on the other side than at home.
+        """
+        return [
+            np.where(side * at_home < 0.0, -distance, distance)
+            for (distance, side), (_, at_home) in zip(self._closest, home._closest, strict=True)
+        ]
+
+    @cached_property
+    def _closest(self) -> list[tuple[Any, FloatArray]]:
         base = [minus(end, leg) for end, leg in zip(self.ends, self.legs, strict=True)]
         return [
             _distance(base[i - 1], self.legs[i - 1], base[j - 1], self.legs[j - 1])
@@ -261,15 +275,18 @@ def _axes(x: list[Any]) -> tuple[Vec, Vec, Vec]:
     return u, v, cross(u, v)
 
 
-def _distance(a: Vec, u: Vec, b: Vec, v: Vec) -> Any:
-    """Return the distance of the segments from a by u and from b by v.
+def _distance(a: Vec, u: Vec, b: Vec, v: Vec) -> tuple[Any, FloatArray]:
+    """Return the distance of the segments from a by u and from b by v, and the side of the first.
 
-    Where the closest points lie changes the distance to second order alone, so that it may be
-    found from the real parts.
+    The side is 1 or −1 if the closest points lie within both, and else 0. Where they lie changes
+    the distance to second order alone, so that it may be found from the real parts.
     """
     r = minus(a, b)
-    s, t = closest_shares(*((e[0].real, e[1].real, e[2].real) for e in (u, v, r)))
-    return norm(plus(r, minus(times(s, u), times(t, v))))
+    real: list[Vec] = [(e[0].real, e[1].real, e[2].real) for e in (u, v, r)]
+    s, t = closest_shares(*real)
+    inner = (0.0 < s) & (s < 1.0) & (0.0 < t) & (t < 1.0)
+    side = np.where(inner, np.sign(dot(real[2], cross(real[0], real[1]))), 0.0)
+    return norm(plus(r, minus(times(s, u), times(t, v)))), side
 
 
 def closest_shares(u: Vec, v: Vec, r: Vec) -> tuple[FloatArray, FloatArray]:
