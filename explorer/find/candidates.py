@@ -14,7 +14,7 @@ import numpy as np
 from explorer.find import machine_values as m
 from explorer.find.machine_values import HOME, BoxPoses, MachineValues
 from explorer.find.over_tilts import CORNERS
-from explorer.find.terms import Terms
+from explorer.find.terms import Terms, part_slacks
 from explorer.numerics.arrays import FloatArray
 
 # Ranges of the variables, over the diagonal of the box or in radians.
@@ -60,6 +60,10 @@ def misses(terms: Terms, at: MachineValues, home: MachineValues) -> tuple[FloatA
     if terms.distance > 0.0:
         near = np.min([each.min(axis=1) for each in at.uncrossed_distances(home)], axis=0)
         found.append(1.0 - near / terms.distance)
+    if terms.parts is not None:
+        tight = [np.asarray(each).min(axis=-1) for each in part_slacks(terms.parts, home)]
+        found.append(-np.min(np.broadcast_arrays(*tight), axis=0) / (0.2 * large))
+        found.append(((longest + terms.parts.dead) / (2.0 * shortest)).max(axis=1) - 1.0)
     return np.max(found, axis=0), large
 
 

@@ -16,7 +16,7 @@ from explorer.find.machine_values import BoxPoses
 from explorer.find.over_poses import missed_amounts, poses_of, prove_demands, sample_demands
 from explorer.find.over_tilts import limit_names, prove_limits, worst_place
 from explorer.find.terms import Terms
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.cells import CellValues
 
 # Share by which the limits of lengths exceed the lengths that were found.
@@ -46,10 +46,10 @@ class Certificate:
     """
 
     ranges: FloatArray
-    limits: FloatArray
+    limits: BoolArray
     missed_limits: FloatArray
     limit_poses: BoxPoses
-    demands: FloatArray
+    demands: BoolArray
     missed_demands: FloatArray
     demand_poses: BoxPoses
 

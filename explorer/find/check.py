@@ -119,7 +119,7 @@ class _Check:
             problems = buildability(self.design)
             fits = not problems.problems and not problems.short_legs
             words = "; ".join(problems.problems) or (
-                f"strokes of legs {', '.join(map(str, problems.short_legs))} are too long for one rod"
+                f"legs {', '.join(map(str, problems.short_legs))} need more than one rod"
                 if problems.short_legs
                 else ""
             )

@@ -32,6 +32,7 @@ from explorer.mechanism.design import LENGTHS, Design
 from explorer.numerics import checks
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.search.sqp import Stop
+from explorer.prototype.fitting import buildability
 
 # Units of work in a second: about those of one core of a laptop.
 UNITS_PER_SECOND = 250.0
@@ -59,7 +60,7 @@ OTHER_KINDS: tuple[Preference, ...] = (
 
 @dataclass
 class Machine:
-    """A machine that keeps a requirement: its row, its certificate its cost of a kind, and poses."""
+    """A machine that keeps a requirement: row, certificate, cost of its kind, and poses."""
 
     x: FloatArray
     certificate: Certificate
@@ -139,7 +140,10 @@ class Search:
                 for row in np.argsort(missed)[:TRIED]:
                     self.spend(CERTIFICATE_UNITS)
                     certificate = certify(x[row], self.terms, cells=CELLS)
-                    if certificate.is_kept:
+                    parts = self.terms.parts
+                    if certificate.is_kept and (
+                        parts is None or fits(x[row], self.terms, certificate)
+                    ):
                         poses = standard_poses(self.terms.tilt)
                         cost = Improvement(self.terms, self.kinds[0], x[row]).cost(poses)
                         yield Machine(x[row], certificate, cost, self.kinds[0], poses)
@@ -185,7 +189,8 @@ class Search:
             self.spend(CERTIFICATE_UNITS)
             found = certify(x, self.terms, cells=CELLS, poses=poses, is_quick=True)
             if found.is_kept:
-                return Machine(x, found, improved.cost, kind, poses)
+                is_built = self.terms.parts is None or fits(x, self.terms, found)
+                return Machine(x, found, improved.cost, kind, poses) if is_built else None
             # Legs that cross between the poses stay crossed.
             crossed = found.missed_demands[: len(PAIRS)] > CROSSED * self.terms.distance
             if self.terms.distance > 0.0 and crossed.any():
@@ -300,6 +305,12 @@ def _nearest(
             break
         found += nearest_values(requirement, [name], keeps)
     return tuple(found)
+
+
+def fits(x: FloatArray, terms: Terms, certificate: Certificate) -> bool:
+    """Return whether the parts of a machine fit, and the strokes of its legs are those of rods."""
+    built = buildability(design_of(x, terms, certificate.ranges, "machine"))
+    return not built.problems and not built.short_legs
 
 
 def _never() -> bool:

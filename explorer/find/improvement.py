@@ -18,7 +18,7 @@ from explorer.find import machine_values as m
 from explorer.find.machine_values import HOME, BoxPoses
 from explorer.find.over_tilts import sides_of
 from explorer.find.requirement import Preference
-from explorer.find.terms import Terms
+from explorer.find.terms import ROOM, Parts, Terms, part_slacks
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.search import one_thread
 from explorer.optimise.search.sqp import Point, slsqp
@@ -94,7 +94,7 @@ class Improvement:
         self.free, self._before_each = free_variables(terms), before_each
         self.extra = [each for each in self.weights if each != LENGTH]
 
-    def table(self, x: FloatArray, poses: BoxPoses, bounds: FloatArray) -> FloatArray:
+    def table(self, x: Any, poses: BoxPoses, bounds: Any) -> Any:
         """Return the slacks of machines (n, 18) in poses, shape (n, demands, k).
 
         The bounds, shape (n, 5 + extra), are the shortest length of each leg, the longest of all,
@@ -116,15 +116,28 @@ class Improvement:
             cosine = math.cos(terms.swing) + RESERVE
             rows += [each - cosine for each in at.swings(home)]
         if terms.distance > 0.0:
-            rows += [each - terms.distance * (1.0 + 100.0 * RESERVE) for each in at.uncrossed_distances(home)]
+            rows += [
+                each - terms.distance * (1.0 + 100.0 * RESERVE)
+                for each in at.uncrossed_distances(home)
+            ]
+        if terms.parts is not None:
+            rows += self._parts(terms.parts, home, shortest, at)
         rows += self._machine(at)
         rows += self._preferred(at, bounds.T[5:, :, None])
         shape = (len(x), len(poses.places))
         return np.stack([np.broadcast_to(row, shape) for row in rows], axis=1)
 
-    def _machine(self, at: m.MachineValues) -> list[FloatArray]:
+    def _parts(
+        self, parts: Parts, home: m.MachineValues, shortest: Any, at: m.MachineValues
+    ) -> list[FloatArray]:
+        """Return the slacks of the distances that the parts need at home, and of the strokes."""
+        rows = part_slacks(parts, home)
+        pairs = zip(at.lengths, shortest, (1.0 + ROOM) * parts.dead, strict=True)
+        return rows + [2.0 * short - dead - each for each, short, dead in pairs]
+
+    def _machine(self, at: m.MachineValues) -> list[Any]:
         """Return the slacks of forces, speeds, transmission, error and deflection."""
-        terms, rows = self.terms, list[FloatArray]()
+        terms, rows = self.terms, list[Any]()
         keeps = 1.0 - 200.0 * RESERVE
         if math.isfinite(terms.push) and (terms.force or terms.weight.any()):
             weight, centre = (tuple(each) for each in (terms.weight, terms.centre))
@@ -144,7 +157,7 @@ class Improvement:
             rows.append(keeps - terms.actuator_error * total / terms.error)
         if math.isfinite(terms.deflection):
             weight, centre = (tuple(each) for each in (terms.weight, terms.centre))
-            forces = [_size(each) for each in at.weight_forces(weight, centre)]
+            forces = [m.size(each) for each in at.weight_forces(weight, centre)]
             total = sum(
                 speed * (force + terms.force * speed)
                 for speed, force in zip(at.tool_speeds, forces, strict=True)
@@ -212,7 +225,8 @@ class Improvement:
             rows = np.unique(np.concatenate([rows, more]), axis=0)
             if missed <= FEASIBLE and 0.0 < gain < SETTLED:
                 break
-            if trusted < LEAST_TRUSTED or (turn >= PATIENCE and missed > HOPELESS):
+            is_hopeless = missed > (HOPELESS if turn < LONG else FEASIBLE)
+            if trusted < LEAST_TRUSTED or (turn >= PATIENCE and is_hopeless):
                 break
         return Improved(x, missed, cost)
 
@@ -253,9 +267,7 @@ class Improvement:
         ends = np.column_stack([np.maximum(lows, y - near), np.minimum(highs, y + near)])
         equal = np.zeros(len(rows), dtype=bool)
         with np.errstate(all="ignore"), one_thread():
-            found = slsqp(
-                evaluate, lambda *_: None, y, ends, equal, most=STEPS, precision=PRECISION
-            )
+            found = slsqp(evaluate, _ignore, y, ends, equal, most=STEPS, precision=PRECISION)
         y = found if np.isfinite(found).all() else y
         moved = x.copy()
         moved[free] = y[:n]
@@ -284,7 +296,11 @@ TRUSTED, LEAST_TRUSTED, SETTLED = 0.3, 2e-3, 1e-3
 # Weight of what is missed beside the cost, and steps of the solver in a round.
 COST_OF_MISSES, STEPS = 30.0, 12
 # Rounds after which a machine that misses a demand by more than this is given up.
-PATIENCE, HOPELESS = 3, 0.02
+PATIENCE, HOPELESS, LONG = 3, 0.02, 10
+
+
+def _ignore(_: FloatArray, __: FloatArray) -> None:
+    return
 
 
 def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -299,8 +315,3 @@ def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]
     least = [0.02] * 4 + [0.1] + [-30.0] * count
     most = [FARTHEST] * 4 + [min(FARTHEST, search.terms.longest)] + [30.0] * count
     return np.array([*lows[free], *least]), np.array([*highs[free], *most])
-
-
-def _size(value: FloatArray) -> FloatArray:
-    """Return |value|, analytic where it is not zero."""
-    return np.where(np.real(value) < 0.0, -value, value)

@@ -92,19 +92,22 @@ def norm(a: Vec) -> Any:
     return square.root() if isinstance(square, Affine) else np.sqrt(square)
 
 
+def size(value: Any) -> Any:
+    """Return |value|, analytic where it is not zero."""
+    sign: FloatArray = np.where(np.real(value) < 0.0, -1.0, 1.0)
+    return sign * value
+
+
 class MachineValues:
     """The values of machines x (..., n) in k poses over a box, arrays (..., k), computed when used.
 
     The edges of the box (3,) are over its diagonal, as all lengths are.
     """
 
-    def __init__(self, x: FloatArray, edges: FloatArray, poses: BoxPoses) -> None:
-        self.poses, self.edges, self.x = (
-            poses,
-            edges,
-            [column[..., None] for column in np.moveaxis(x, -1, 0)],
-        )
-        x = self.x
+    def __init__(self, machines: Any, edges: FloatArray, poses: BoxPoses) -> None:
+        self.poses, self.edges = poses, edges
+        x: list[Any] = [column[..., None] for column in np.moveaxis(machines, -1, 0)]
+        self.x = x
         along = (0.5 * edges * poses.places).T
         c, s = np.cos(x[BOX_YAW]), np.sin(x[BOX_YAW])
         offset: Vec = along[0] * c - along[1] * s, along[0] * s + along[1] * c, along[2]
@@ -178,7 +181,7 @@ class MachineValues:
         return [distance for distance, _ in self._closest]
 
     def uncrossed_distances(self, home: MachineValues) -> list[Any]:
-        """Return the distances of the pairs, negative where two legs have passed through each other.
+        """Return the distances of the pairs, negative where two legs have crossed.
 
         They have if they pass each other on the other side than at home.
         """
@@ -284,12 +287,12 @@ def _distance(a: Vec, u: Vec, b: Vec, v: Vec) -> tuple[Any, FloatArray]:
     r = minus(a, b)
     real: list[Vec] = [(e[0].real, e[1].real, e[2].real) for e in (u, v, r)]
     s, t = closest_shares(*real)
-    inner = (0.0 < s) & (s < 1.0) & (0.0 < t) & (t < 1.0)
+    inner = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
     side = np.where(inner, np.sign(dot(real[2], cross(real[0], real[1]))), 0.0)
     return norm(plus(r, minus(times(s, u), times(t, v)))), side
 
 
-def closest_shares(u: Vec, v: Vec, r: Vec) -> tuple[FloatArray, FloatArray]:
+def closest_shares(u: Any, v: Any, r: Any) -> tuple[FloatArray, FloatArray]:
     """Return the shares s and t, 0 to 1, at which |r + s u − t v| is least."""
     uu, vv, uv, ur, vr = dot(u, u), dot(v, v), dot(u, v), dot(u, r), dot(v, r)
     across = np.maximum(uu * vv - uv * uv, 1e-14 * uu * vv)

@@ -180,7 +180,10 @@ class _OverTilts:
         return lengths_of(apexes - np.clip(apexes, -half, half)) - self.ranges[:, 0]
 
     def bound_shortest(self, places: FloatArray) -> FloatArray:
-        """Return lower bounds of slacks of shortest lengths over cells' corners (n, 4, 2), (n, 4)."""
+        """Return lower bounds of the slacks of shortest lengths over cells, shape (n, 4).
+
+        The cells are given by their corners, (n, 4, 2).
+        """
         apexes, half = self._apexes(places), self._halves
         middle = apexes.mean(axis=1)
         outwards = middle - np.clip(middle, -half, half)

@@ -5,8 +5,10 @@ Lengths are over the diagonal of the required box, angles in radians, forces in 
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -24,9 +26,63 @@ from explorer.mechanism.pose import (
     yaw_pitch_roll_from_rotation,
 )
 from explorer.numerics.arrays import FloatArray
+from explorer.prototype.sizes import CLEARANCE, FIRST_SWING, THINNEST_LEG, GuideSizes, LegSizes
 
 # Millimetres in one unit of the designs that are made.
 UNIT_MM = 10.0
+
+
+class Parts(NamedTuple):
+    """Least distances that the parts of a machine need, see `explorer.prototype.sizes`.
+
+    Attributes:
+        dead: What the longest length of each leg lacks to twice the shortest one, shape (4,).
+        carriages: Distance of the two carriages.
+        from_a1: Distance of a carriage from a1.
+        from_guide: Distance of a3 from the guide.
+        balls: Distance of two of the points b1 to b4.
+    """
+
+    dead: FloatArray
+    carriages: float
+    from_a1: float
+    from_guide: float
+    balls: float
+
+    @staticmethod
+    def of(diameter_mm: float, scale_mm: float) -> Parts:
+        """Return the distances over a scale for legs of a diameter, or for the thinnest legs."""
+        radius = 0.5 * diameter_mm or THINNEST_LEG
+        guide, own = GuideSizes(radius), LegSizes(radius, 0.0)
+        ends = [own.bottom, guide.eye, guide.eye, own.bottom]
+        dead = [LegSizes(radius, end + own.plate).dead for end in ends]
+        sweep = LegSizes(radius, own.bottom + own.plate).sweep(guide.eye)
+        return Parts(
+            dead=np.array(dead) / scale_mm,
+            carriages=(2.0 * radius + CLEARANCE) / scale_mm,
+            from_a1=(sweep + 2.0 * CLEARANCE + guide.pillar + radius) / scale_mm,
+            from_guide=(sweep + CLEARANCE + guide.eye) / scale_mm,
+            balls=(2.0 * own.cup + CLEARANCE) / scale_mm,
+        )
+
+
+# Share by which machines exceed the distances that their parts need, and the cosine of a lean.
+ROOM = 0.01
+
+
+def part_slacks(parts: Parts, home: MachineValues) -> list[FloatArray]:
+    """Return what the distances of the parts of machines at home exceed those that they need."""
+    x, keeps = home.x, 1.0 + ROOM
+    d1, d3 = (end[0] for end in home.ends[1:3])
+    rows = [m.size(d3 - d1) - keeps * parts.carriages]
+    rows += [m.size(each) - keeps * parts.from_a1 for each in (d1, d3)]
+    rows.append(m.size(x[m.A3Y]) - keeps * parts.from_guide)
+    points = [(x[m.B1X], x[m.B1Y]), (x[m.B2], 0.0), (x[m.B3], 0.0), (0.0, 0.0)]
+    for (a, b), (c, d) in itertools.combinations(points, 2):
+        rows.append(np.sqrt((a - c) ** 2 + (b - d) ** 2) - keeps * parts.balls)
+    # Legs 1 and 4 may lean so far from the normal of the base.
+    cosine = math.cos(FIRST_SWING) + ROOM
+    return rows + [m.size(home.legs[i][2]) / home.lengths[i] - cosine for i in (0, 3)]
 
 
 @dataclass(frozen=True)
@@ -48,6 +104,7 @@ class Terms:
         transmission, error, deflection: Limits of these; 0 and infinite for none.
         speed, velocity, turning: Largest rate of a joint; speed and rate of turning of the tool.
         hull: Largest edge of the box about all joints.
+        parts: Sizes of the parts where they must fit; None otherwise.
     """
 
     requirement: Requirement
@@ -73,6 +130,7 @@ class Terms:
     velocity: float
     turning: float
     hull: float
+    parts: Parts | None
 
     @staticmethod
     def of(requirement: Requirement) -> Terms:
@@ -109,9 +167,10 @@ class Terms:
             velocity=requirement.tool.speed_mm_s / scale,
             turning=math.radians(requirement.tool.turning_deg_s),
             hull=most(requirement.hull_mm, scale),
+            parts=Parts.of(legs.diameter_mm, scale) if requirement.buildable else None,
         )
 
-    def values(self, x: FloatArray, poses: m.BoxPoses) -> MachineValues:
+    def values(self, x: Any, poses: m.BoxPoses) -> MachineValues:
         """Return the values of machines (..., n) in poses over the box."""
         return MachineValues(x, self.edges, poses)
 
@@ -152,7 +211,7 @@ def design_of(
         a, b, c = (scale * values).tolist()
         return a, b, c
 
-    def six(value: float | None) -> tuple[float, ...] | None:
+    def six(value: float | None) -> Any:
         return None if value is None else (value,) * 6
 
     rotation = rotation_from_yaw_pitch_roll(np.degrees(x[m.YAW : m.TX]))
@@ -160,16 +219,15 @@ def design_of(
     half = 0.5 * terms.edges
     swing = Swing(*(requirement.swing_deg,) * 6)
     radius = 0.5 * legs.diameter_mm / unit
+    ends: list[Any] = (scale * ranges).tolist()
+    lengths: dict[str, Any] = dict(zip(LENGTHS, map(tuple, ends), strict=True))
     limits = Limits(
-        **{
-            name: (low, high)
-            for name, (low, high) in zip(LENGTHS, (scale * ranges).tolist(), strict=True)
-        },
+        **lengths,
         margin=requirement.least_margin_mm / unit,
-        leg_radii=(radius,) * 4,
+        leg_radii=(radius, radius, radius, radius),
         swing=swing,
     )
-    fields = {
+    fields: dict[str, Any] = {
         "name": name,
         "unit_mm": unit,
         "a3": tuple((scale * x[m.A3X : m.B1X]).tolist()),
@@ -182,12 +240,12 @@ def design_of(
         "payload": Payload(payload.mass_kg, point(terms.centre), payload.force_n),
         "gravity": requirement.gravity,
         "actuators": Actuators(
-            push_n=six(legs.push_n),  # type: ignore[arg-type]
-            pull_n=six(legs.pull_n),  # type: ignore[arg-type]
-            error_mm=six(legs.error_mm),  # type: ignore[arg-type]
-            stiffness_n_mm=six(legs.stiffness_n_mm),  # type: ignore[arg-type]
-            speed_mm_s=six(legs.speed_mm_s),  # type: ignore[arg-type]
-            acceleration_mm_s2=six(legs.acceleration_mm_s2),  # type: ignore[arg-type]
+            push_n=six(legs.push_n),
+            pull_n=six(legs.pull_n),
+            error_mm=six(legs.error_mm),
+            stiffness_n_mm=six(legs.stiffness_n_mm),
+            speed_mm_s=six(legs.speed_mm_s),
+            acceleration_mm_s2=six(legs.acceleration_mm_s2),
         ),
         "required_box": (point(centre - half), point(centre + half)),
         "required_yaw": math.degrees(float(x[m.BOX_YAW])),
