@@ -29,6 +29,7 @@ RINGS = {
         "paths",
         "proofs",
         "optimise",
+        "find",
         "prototype",
         "numerics",
     ),

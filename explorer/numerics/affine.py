@@ -88,7 +88,9 @@ class Affine:
             slope = -1.0 / self.centre**2
             # (x − c)² / (c² x) lies between zero and this, on the side of c.
             bend = np.where(least > 0.0, -slope * self.radius**2 / least, np.inf)
-            centre = 1.0 / self.centre + 0.5 * np.where(least > 0.0, bend, 0.0) * np.sign(self.centre)
+            centre = 1.0 / self.centre + 0.5 * np.where(least > 0.0, bend, 0.0) * np.sign(
+                self.centre
+            )
             return Affine(centre, slope[:, None] * self.slopes, -slope * self.rest + 0.5 * bend)
 
     def root(self) -> Affine:

@@ -73,7 +73,9 @@ def largest_values(
         divided = size > 0.0
         if scales is not None:
             divided &= np.arange(len(size)) == (size * scales).argmax()
-        halves = np.array([*itertools.product(*((0.0, 0.5) if each else (0.0,) for each in divided))])
+        halves = np.array(
+            [*itertools.product(*((0.0, 0.5) if each else (0.0,) for each in divided))]
+        )
         low = (low[:, None] + size * halves).reshape(-1, len(size))
         size = np.where(divided, 0.5 * size, size)
         parts = np.array_split(low, 1 + len(low) // BATCH)
