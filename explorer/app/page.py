@@ -23,6 +23,7 @@ from explorer.app.features.optimise.feature import OPTIMISE
 from explorer.app.features.orientation.feature import ORIENTATION
 from explorer.app.features.paths.feature import PATHS
 from explorer.app.features.prototype.feature import PROTOTYPE
+from explorer.app.features.requirement.feature import REQUIREMENT
 from explorer.app.features.sharing.feature import SHARING
 from explorer.app.features.singularity.feature import SINGULARITY
 from explorer.app.features.studies.feature import STUDIES
@@ -54,8 +55,8 @@ from explorer.page.widgets.palette import Command, Palette
 
 # The features, in the order of their tabs and of their parts of the bar.
 FEATURES: tuple[Feature, ...] = (
-    DESIGNS, MECHANISM, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, ORIENTATION, LOADS,
-    PROTOTYPE, LEGS, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
+    DESIGNS, MECHANISM, REQUIREMENT, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, ORIENTATION,
+    LOADS, PROTOTYPE, LEGS, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
 )  # fmt: skip
 # Modules that the process of the page imports at its start.
 TASKS = modules_of(feed for each in FEATURES for feed in (*each.feeds, *each.later_feeds))

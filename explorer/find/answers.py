@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+from explorer.find.requirement import Requirement
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 
@@ -99,12 +100,14 @@ class Relaxation(NamedTuple):
         value: The value; for the box the factor on its edges.
         unit: Unit of the value, "" for the factor.
         words: The value in words, such as "tilt 12.8°" or "box 186 × 140 × 93 mm".
+        requirement: The requirement with that value.
     """
 
     demand: str
     value: float
     unit: str
     words: str
+    requirement: Requirement
 
 
 @dataclass(frozen=True)

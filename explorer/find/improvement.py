@@ -186,7 +186,8 @@ class Improvement:
     def _first_bounds(self, x: FloatArray, poses: BoxPoses) -> FloatArray:
         """Return the least bounds that one machine keeps in poses, shape (5 + extra,)."""
         none = np.zeros((1, 5 + len(self.extra)))
-        table = self.table(x[None], poses, none)[0].min(axis=1)
+        with np.errstate(all="ignore"):
+            table = self.table(x[None], poses, none)[0].min(axis=1)
         lengths = [-float(table[4 + leg]) for leg in range(4)]
         preferred = self._preferred(self.terms.values(x[None], poses), none.T[5:, :, None])
         worst = [-float(np.min(each)) for each in preferred]

@@ -110,9 +110,9 @@ _WORDS = {
 def _in_words(found: Requirement, field: str, factor: float) -> Relaxation:
     if field == "box_mm":
         edges = " × ".join(f"{edge:g}" for edge in found.box_mm)
-        return Relaxation(field, 1.0 / factor, "", f"box {edges} mm")
+        return Relaxation(field, 1.0 / factor, "", f"box {edges} mm", found)
     name, unit = _WORDS[field]
     head, _, tail = field.partition(".")
     value = float(getattr(found.legs, tail) if tail else getattr(found, head))
     space = "" if unit in ("", "°") else " "
-    return Relaxation(field, value, unit, f"{name} {value:g}{space}{unit}")
+    return Relaxation(field, value, unit, f"{name} {value:g}{space}{unit}", found)

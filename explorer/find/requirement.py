@@ -186,8 +186,8 @@ class Requirement(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             )
         if self.margin_mm is not None:
             _set(self, "margin_mm", checks.not_negative("margin_mm", self.margin_mm))
-        free = tuple(checks.one_of("free", each, get_args(Freedom)) for each in self.free)
-        _set(self, "free", free)
+        free = {checks.one_of("free", each, get_args(Freedom)) for each in self.free}
+        _set(self, "free", tuple(each for each in get_args(Freedom) if each in free))
 
     @property
     def diagonal_mm(self) -> float:

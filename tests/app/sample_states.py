@@ -28,6 +28,7 @@ from explorer.app.features.optimise.state import (
     SearchRun,
 )
 from explorer.app.features.paths.actions import Go, Play, SetPathTime
+from explorer.app.features.requirement.state import EXAMPLE, Required
 from explorer.app.features.studies.actions import BrushAxes
 from explorer.app.features.studies.state import Brush, Studies
 from explorer.app.session.history import UserAction
@@ -281,6 +282,7 @@ def rich_state() -> State:
         Pin(OPTIMAL),
         Change("compared", {"look": varied(CompareView())}),
         Set("studies", varied(Studies())),
+        Set("required", Required(msgspec.structs.replace(EXAMPLE, tilt_deg=1 / 3), True)),
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),
         BrushAxes((Brush("volume", ((1 / 3, 10.0),)),)),

@@ -32,6 +32,7 @@ from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import AddIterates, Compare, EndRun
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import AdvanceJourney, SetEnd, SetPathTime, TakePlan
+from explorer.app.features.requirement.state import OpenFound
 from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
@@ -259,7 +260,8 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
-    SetFold, SetVariable, SetName, SetPathTime, SetEnd, PickDesign, OpenSession,
+    SetFold, SetVariable, SetName, SetPathTime, SetEnd, PickDesign, OpenFound,
+    OpenSession,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map, a handle or a file gives."""
 
@@ -467,6 +469,8 @@ WITHOUT_UNIT = {
     "Number of designs": "a count of designs",
     "Name": "a name",
     "Direction": "a direction, of length 1",
+    "Length ratio": "a ratio",
+    "Transmission": "an index, from 0 to 1",
 }
 """Controls of values that have no unit, and what they are."""
 

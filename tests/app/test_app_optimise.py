@@ -39,11 +39,9 @@ from explorer.app.features.optimise.actions import (
 )
 from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, HULL, LIFT, PAPER, REVERT, START
 from explorer.app.features.optimise.feature import (
-    EDGES,
     OptimisePanel,
     charted_iterates,
     data_of,
-    visible_box,
 )
 from explorer.app.features.optimise.runner import Optimiser, result_of
 from explorer.app.features.optimise.state import (
@@ -545,20 +543,6 @@ def test_limits_in_force_are_listed_and_no_others() -> None:
 # What is shown
 
 
-def test_required_box_is_drawn_where_it_is() -> None:
-    assert visible_box(own_state()) is None
-    state = start(replace(MARGIN, free=(PLACE,)))
-    box = requested_box(state)
-    assert visible_box(state) == box
-    edges = corners_of(box)[np.array(EDGES)]
-    sides = np.ptp(np.array(box), axis=0)
-    assert np.sort(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) == pytest.approx(
-        np.sort(np.repeat(sides, 4))
-    )
-    moved = np.array(box) + MOVE
-    assert np.array(visible_box(end(state, (moved_iterate(state),)))) == pytest.approx(moved)
-
-
 def test_place_that_a_search_found_is_in_fields_table_and_design_until_it_is_reverted() -> None:
     before = ask(replace(MARGIN, free=(PLACE,)), own_state())
     state = StartRun().apply(before)
@@ -568,7 +552,7 @@ def test_place_that_a_search_found_is_in_fields_table_and_design_until_it_is_rev
     ended = end(state, (best,))
     accepted = Accept().apply(ended)
     for each in (ended, accepted):
-        assert requested_box(each) == visible_box(each) == each.design.required_box == moved
+        assert requested_box(each) == each.design.required_box == moved
         assert decode_design(encode_design(each.design), "it").required_box == moved
     both = compare_designs(run.problem, run.own.design, best.design)
     compared = run_of(Compare(run.number, both).apply(accepted))

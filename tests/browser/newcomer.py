@@ -99,6 +99,16 @@ class Newcomer:
             self.page.keyboard.type(text)
             self.page.keyboard.press("Enter")
 
+    def type_all(self, first: str, *texts: str) -> None:
+        """Press a field, and type into it and those after it, each left by the key Tab."""
+        self.presses += 1
+        self.field(first).click()
+        self.page.keyboard.press("ControlOrMeta+a")
+        for text in texts:
+            with self._tab.slow_time():
+                self.page.keyboard.type(text)
+                self.key("Tab")
+
     def choose(self, words: str, option: str) -> None:
         """Open a list and press an option."""
         self.presses += 2

@@ -224,14 +224,20 @@ def _kinds() -> dict[str, Any]:
 
 
 def _state_of(values: dict[str, Any]) -> State:
-    """Return the state with values by their paths.
+    """Return the state with values by their paths; what a part lacks is as in a new state.
 
     Raises:
         Exception: A value is missing, or a part refuses one.
     """
     own = {path: value for path, value in values.items() if "." not in path}
     parts = {
-        name: kind(**{each.name: values[f"{name}.{each.name}"] for each in saved_fields(kind)})
+        name: kind(
+            **{
+                each.name: values[f"{name}.{each.name}"]
+                for each in saved_fields(kind)
+                if f"{name}.{each.name}" in values
+            }
+        )
         for name, kind in FEATURE_PARTS.items()
     }
     return State(**own, parts=parts)

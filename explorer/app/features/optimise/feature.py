@@ -1,4 +1,4 @@
-"""The optimiser: its tab with problem, search and charts, its part of the bar, the required box."""
+"""The optimiser: its tab with problem, search and charts, and its part of the bar."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viser import uplot
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.optimise.actions import SetObjective, SetRequest
-from explorer.app.features.optimise.buttons import ACCEPT, BUTTONS, PAPER, add_buttons, button
+from explorer.app.features.optimise.buttons import ACCEPT, add_buttons, button
 from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest, SearchRun
 from explorer.app.features.optimise.words import goal_unit, result_words, search_notice
@@ -23,22 +23,18 @@ from explorer.app.features.optimise.work import complete_request, requested_box
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
-from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import preset_of
 from explorer.app.state.state import State
 from explorer.app.widgets import charts
-from explorer.app.widgets.buttons import activity, open_button
-from explorer.measures.box import corners_of
+from explorer.app.widgets.buttons import activity
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
-from explorer.optimise.problem import OVER_BOX, YAW, Box, ObjectiveName, Problem
+from explorer.optimise.problem import OVER_BOX, YAW, ObjectiveName, Problem
 from explorer.page.widgets.assigning import Update
 from explorer.statics.compliance import is_elastic
 
@@ -313,44 +309,16 @@ def _scales(curve: Curve) -> dict[str, uplot.Scale]:
 
 
 TAB = "Optimise"
-# The twelve edges of a cube by its corners, whose bits are the axes.
-EDGES = tuple((a, a | 1 << axis) for a in range(8) for axis in range(3) if not a >> axis & 1)
 
 
 def search_chip(frame: Frame) -> str:
-    """Return the search that runs or waits for an answer, or where to begin, as HTML."""
+    """Return the search that runs or waits for an answer, as HTML."""
     state = frame.state
     notice = search_notice(state)
-    if notice is not None:
-        buttons = "".join(button(name, state, is_main=name == ACCEPT) for name in notice.buttons)
-        return activity(TAB, notice.title, notice.text, notice.share, buttons)
-    if Optimisation.of(state).run is None and preset_of(state.design) is not None:
-        paper, look = BUTTONS[PAPER], "ex-tool ex-outlined"
-        return open_button(TAB, paper.own_words, press=PAPER, hint=paper.does, class_name=look)
-    return ""
-
-
-class RequiredBox(ScenePart):
-    """The edges of the required box, if there is one."""
-
-    def __init__(self, services: Services) -> None:
-        self._edges = add_lines(services.scene, "/required_box", len(EDGES), GHOST, 2.0)
-
-    def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield the updates that draw the box of a frame."""
-        box = visible_box(placed.frame.state)
-        yield self._edges, "visible", box is not None
-        if box is not None:
-            edges = placed.scale * corners_of(box)[np.array(EDGES)]
-            yield self._edges, "points", edges.astype(np.float32)
-
-
-def visible_box(state: State) -> Box | None:
-    """Return the box of the present run, else that of the problem, if any."""
-    run = Optimisation.of(state).run
-    if run is not None and run.iterates and not run.accepted:
-        return (run.best or run.iterates[-1]).design.required_box
-    return requested_box(state) if _request(state).needs_box else None
+    if notice is None:
+        return ""
+    buttons = "".join(button(name, state, is_main=name == ACCEPT) for name in notice.buttons)
+    return activity(TAB, notice.title, notice.text, notice.share, buttons)
 
 
 OPTIMISE = Feature(
@@ -358,6 +326,5 @@ OPTIMISE = Feature(
     manual="optimise.md#On the page",
     tabs=(Tab("work", "Optimise", OptimisePanel, viser.Icon.SPARKLES),),
     bar=(InBar("right", lambda _: search_chip),),
-    scene=(RequiredBox,),
     runners=(Optimiser,),
 )

@@ -1,0 +1,235 @@
+"""*What must it do?*: the form of the requirement, the machines found, and the checklist."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import viser
+
+from explorer.app.features.feature import Feature, InBar, Services, Tab
+from explorer.app.features.requirement import words
+from explorer.app.features.requirement.runner import Finder
+from explorer.app.features.requirement.scene import RequiredBox
+from explorer.app.features.requirement.state import FORM, OpenFound, Required
+from explorer.app.features.requirement.work import CHECK_FEED
+from explorer.app.inputs.bindings import At, ControlBinding
+from explorer.app.inputs.controls import MAIN, Controls
+from explorer.app.session.session import Who
+from explorer.app.state.actions import Action, Set
+from explorer.app.state.frame import Frame
+from explorer.app.state.moves import SetPose
+from explorer.app.state.parts import value_at
+from explorer.app.state.state import State
+from explorer.app.widgets.buttons import open_button
+from explorer.app.widgets.markup import beside, box
+from explorer.app.widgets.under_way import look_of
+from explorer.find.requirement import (
+    PREFERENCES,
+    Requirement,
+    decode_requirement,
+    encode_requirement,
+    legs_from_row,
+)
+from explorer.page.widgets.assigning import Update
+
+Field = tuple[str, str, float, str]
+"""A number of the form: its label, its field, its step, and what it means."""
+
+TASK: Sequence[Field] = (
+    ("Tilt (°)", "tilt_deg", 1.0, "Largest tilt from home, about any level axis."),
+    ("Payload (kg)", "payload.mass_kg", 0.1, "Mass of tool and payload."),
+    ("Force (N)", "payload.force_n", 1.0, "Force of the process, of any direction."),
+)
+LEGS: Sequence[Field] = (
+    ("Length ratio", "legs.ratio", 0.05, "Longest over shortest length of a leg."),
+    ("Longest (mm)", "legs.longest_mm", 1.0, "Longest leg; 0 for as short as possible."),
+    ("Push (N)", "legs.push_n", 10.0, "Largest push of an actuator; 0 for no limit."),
+    ("Pull (N)", "legs.pull_n", 10.0, "Largest pull; 0 for the same as the push."),
+    ("Diameter (mm)", "legs.diameter_mm", 1.0, "Diameter of the legs."),
+    ("Distance (mm)", "legs.apart_mm", 1.0, "Least distance between two legs."),
+    ("Swing (°)", "swing_deg", 1.0, "How far a joint swings from home; 0 for no limit."),
+)
+MORE: Sequence[Field] = (
+    ("Leg speed (mm/s)", "legs.speed_mm_s", 10.0, "Largest speed of an actuator."),
+    ("Leg accel. (mm/s²)", "legs.acceleration_mm_s2", 100.0, "Largest acceleration of one."),
+    ("Stiffness (N/mm)", "legs.stiffness_n_mm", 10.0, "Of an actuator; 0 for rigid ones."),
+    ("Leg error (mm)", "legs.error_mm", 0.001, "Positioning error of an actuator, ±."),
+    ("Tool error (mm)", "error_mm", 0.001, "Largest error of the tool by those of the legs."),
+    ("Deflection (mm)", "deflection_mm", 0.01, "Largest deflection of the tool by the load."),
+    ("Tool speed (mm/s)", "tool.speed_mm_s", 10.0, "Speed of the tool in every direction."),
+    ("Turning (°/s)", "tool.turning_deg_s", 1.0, "Rate of turning about every axis."),
+    ("Move (s)", "move_s", 0.1, "Time of a move along a diagonal of the box."),
+    ("Margin (mm)", "margin_mm", 1.0, "Least |δ|; 0 for 2 % of the diagonal of the box."),
+    ("Transmission", "transmission", 0.05, "Least transmission index, below 1."),
+    ("Outer size (mm)", "hull_mm", 10.0, "Largest edge of a box about all joints."),
+)
+# A requirement that states no more than its box.
+BLANK = Requirement(box_mm=(1.0, 1.0, 1.0))
+PREFERRED = {kind.replace("-", " "): kind for kind in PREFERENCES}
+FREE: dict[str, object] = {
+    "nothing": (),
+    "orientation": ("orientation",),
+    "tool": ("tool",),
+    "orientation and tool": ("orientation", "tool"),
+}
+FIND_HINT = "Search for machines that keep this requirement."
+CANCEL_HINT = "End the search, and keep what it has found."
+CHECK_HINT = "Check the present design against this requirement, on every change."
+SAVE_HINT = "Download this requirement; its file opens again when it is dropped on the page."
+ROW_HINT = "A row of a data sheet, such as: stroke 150 retracted 220 push 300 N speed 50 mm/s."
+
+CHECK = Set("required.is_checked", True, "Check the requirement")
+
+
+class RequirementPanel:
+    """The form, the buttons that search and check, and the machines that were found."""
+
+    def __init__(self, services: Services) -> None:
+        gui, self._services = services.gui, services
+        self._finder, self._controls = services.get(Finder), Controls(services)
+        gui.add_html(beside(2))
+        with gui.add_folder("The task"):
+            hint = "Edges of the box that the tool must reach, with home in its middle."
+            self._controls.triple("Box (mm)", hint, f"{FORM}.box_mm", step=1.0)
+            self._add_numbers(TASK)
+            hint = "What is best among the machines that keep the requirement."
+            self._controls.dropdown("Prefer", hint, PREFERRED, f"{FORM}.prefer")
+            hint = "Demand that the parts of the machine fit into each other."
+            self._controls.checkbox("Buildable", hint, f"{FORM}.buildable")
+        with gui.add_folder("The legs"):
+            self._add_numbers(LEGS)
+        with gui.add_folder("More", expand_by_default=False), services.commands.within("More"):
+            self._add_more(gui)
+        gui.add_html(beside(3))
+        self._find = self._button("Find machines", FIND_HINT, self._finder.start)
+        self._find.color = MAIN
+        self._cancel = self._button("Cancel", CANCEL_HINT, lambda _, __: self._finder.cancel())
+        self._check = self._controls.button("Check this design", CHECK_HINT, lambda: CHECK)
+        self._button("Save as a file", SAVE_HINT, self._save)
+        self._result = gui.add_html("")
+        services.buttons.on(words.RELAX, self._relax, values=INDICES)
+        services.do_on_press(words.OPEN, self._open, INDICES)
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that show the requirement of a frame and what was found."""
+        yield from self._controls.updates(frame)
+        finder, part = self._finder, Required.of(frame.state)
+        is_on = finder.job is not None
+        yield self._find, "visible", not is_on
+        yield self._cancel, "visible", is_on
+        yield self._check, "visible", not part.is_checked
+        look = "" if finder.requirement == part.form else "is-outdated"
+        content = "".join(words.result(finder.found, is_searching=is_on))
+        yield self._result, "content", box(f'<div class="{look}">{content}</div>')
+
+    def _add_numbers(self, fields: Sequence[Field]) -> None:
+        """Add fields for numbers, whose zeros are no demands where these would be None."""
+        for label, field, step, hint in fields:
+            at = At(f"{FORM}.{field}")
+            if value_at(BLANK, field) is None:
+                at = At(at.path, default=lambda _: 0.0, convert=lambda value: value or None)
+            self._controls.number(label, hint, at, least=0.0, step=step)
+
+    def _add_more(self, gui: viser.GuiApi) -> None:
+        for first in range(0, len(MORE), 2):
+            gui.add_html(beside(2))
+            self._add_numbers(MORE[first : first + 2])
+        hint = "Centre of mass of the payload from b4, in the platform frame."
+        self._controls.triple("Centre (mm)", hint, f"{FORM}.payload.centre_mm", step=1.0)
+        gui.add_html(beside(2))
+        hint = "What a search may choose besides the machine and the yaw of the box."
+        self._controls.dropdown("Free", hint, FREE, f"{FORM}.free")
+        hint = "Gravity pulls from the base to the platform."
+        self._controls.checkbox("Hanging", hint, ControlBinding(_is_hanging, _hang))
+        gui.add_html(beside(2))
+        self._row = gui.add_text("Data sheet", "", hint=ROW_HINT)
+        self._button("Read the row", "Take the values of the row into the form.", self._read_row)
+
+    def _button(
+        self, label: str, hint: str, act: Callable[[Requirement, Who], None]
+    ) -> viser.GuiButtonHandle:
+        """Add a button, whose action takes the requirement of the form."""
+        handle = self._services.gui.add_button(label, hint=hint, color=None)
+
+        def run(who: Who) -> None:
+            act(Required.of(self._services.session.latest_state()).form, who)
+
+        handle.on_click(lambda event: run(event.client_id))
+        self._services.commands.offer(handle, lambda client: run(client.client_id))
+        return handle
+
+    def _save(self, form: Requirement, who: Who) -> None:
+        self._services.downloads.send(who, f"{form.name}.json", encode_requirement(form))
+
+    def _read_row(self, _: Requirement, who: Who) -> None:
+        def change(state: State) -> Action:
+            legs = legs_from_row(self._row.value, Required.of(state).form.legs)
+            return Set(f"{FORM}.legs", legs, "Legs of a data sheet")
+
+        self._services.session.do(change, who=who)
+
+    def _open(self, index: str) -> OpenFound | None:
+        designs = () if self._finder.found is None else self._finder.found.designs
+        machine = next((each.design for each in designs[int(index) :]), None)
+        return None if machine is None else OpenFound(machine, self._finder.requirement)
+
+    def _relax(self, index: str, client: viser.ClientHandle) -> None:
+        nearest = () if self._finder.found is None else self._finder.found.nearest
+        for each in nearest[int(index) :][:1]:
+            change = Set(FORM, each.requirement, "Requirement", each.words)
+            self._services.session.do(change, who=client.client_id)
+            self._finder.start(each.requirement, client.client_id)
+
+
+def _is_hanging(frame: Frame) -> bool:
+    return Required.of(frame.state).form.gravity[2] > 0.0
+
+
+def _hang(_: State, on: bool) -> Action:
+    gravity = (0.0, 0.0, 1.0 if on else -1.0)
+    return Set(f"{FORM}.gravity", gravity, "Hanging", "on" if on else "off")
+
+
+class Checklist:
+    """The checklist over the scene while the design is checked against a requirement."""
+
+    def __init__(self, services: Services) -> None:
+        self._feed = services.get(CHECK_FEED)
+        services.do_on_press(words.DROP, lambda _: Set(CHECK.at, False, CHECK.name))
+        services.do_on_press(words.GO, self._go)
+
+    def __call__(self, frame: Frame) -> str:
+        """Return the checklist for a frame, as HTML."""
+        if Required.of(frame.state).requirement is None:
+            return ""
+        return words.checklist(self._feed.drawing, self._feed.problem or "", look_of(self._feed))
+
+    def _go(self, name: str) -> SetPose | None:
+        demands = () if self._feed.drawing is None else self._feed.drawing.demands
+        pose = next((each.pose for each in demands if each.name == name), None)
+        return None if pose is None else SetPose(pose)
+
+
+def open_requirement(_: Services, data: bytes, name: str) -> tuple[Action, str]:
+    """Return the action that takes the requirement in a file into the form; see `Opener`."""
+    form = decode_requirement(data, name)
+    action = Set(FORM, form, "Requirement", form.name)
+    return action, f"The requirement {form.name}; “{words.TITLE}” has it."
+
+
+INDICES = tuple(map(str, range(10)))
+"""The values of buttons of machines and of relaxations."""
+
+OPENS_HINT = "State what a machine must do, and find machines that do it."
+OPENS = open_button(words.TITLE, words.TITLE, hint=OPENS_HINT, class_name="ex-tool ex-outlined")
+
+REQUIREMENT = Feature(
+    "requirement",
+    manual="requirements.md",
+    tabs=(Tab("dialog", words.TITLE, RequirementPanel),),
+    bar=(InBar("left", lambda _: lambda __: OPENS), InBar("left", Checklist)),
+    scene=(RequiredBox,),
+    later_feeds=(CHECK_FEED,),
+    runners=(Finder,),
+    openers={"box_mm": open_requirement},
+)

@@ -1,0 +1,50 @@
+"""The requirement's part of the state, and the action that opens a machine that was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from explorer.app.state.actions import Open
+from explorer.app.state.parts import FeaturePart, with_value
+from explorer.app.state.state import State
+from explorer.find.requirement import RequiredLegs, RequiredLoad, Requirement
+
+FORM = "required.form"
+"""The path of the requirement of the form."""
+
+EXAMPLE = Requirement(
+    name="need",
+    box_mm=(200.0, 150.0, 100.0),
+    tilt_deg=15.0,
+    payload=RequiredLoad(2.0, (0.0, 0.0, 30.0), 5.0),
+    legs=RequiredLegs(ratio=1.8, push_n=300.0, diameter_mm=16.0, apart_mm=5.0),
+    swing_deg=45.0,
+    buildable=True,
+)
+
+
+@dataclass(frozen=True)
+class Required(FeaturePart, name="required"):
+    """The requirement of the form, and whether the design is checked against it.
+
+    It is in millimetres, degrees and newtons, and stays as it is in every design and unit.
+    """
+
+    form: Requirement = EXAMPLE
+    is_checked: bool = False
+
+    @property
+    def requirement(self) -> Requirement | None:
+        """The requirement that the design is checked against; None if there is none."""
+        return self.form if self.is_checked else None
+
+
+@dataclass(frozen=True)
+class OpenFound(Open):
+    """Open a design that was found, with the requirement that it keeps beside it."""
+
+    requirement: Requirement
+
+    def apply(self, state: State) -> State:
+        """Return the next state; refuse while the design is being optimised."""
+        return with_value(super().apply(state), "required", Required(self.requirement, True))
