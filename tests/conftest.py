@@ -27,7 +27,6 @@ RINGS = {
         "workspace",
         "measures",
         "paths",
-        "proofs",
         "optimise",
         "find",
         "prototype",

@@ -32,7 +32,7 @@ COMMANDS: Mapping[str, str] = {
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
     "orientation": "Measure the orientations of a position: share of all, greatest tilts, torsion.",
     "reproduce": "Measure the claims of the paper again, and judge each.",
-    "optimise": "Optimise a design by SQP: match a volume, shorten the longest leg, or others.",
+    "optimise": "Optimise a design by SQP: match a volume, shorten the legs, or raise the volume.",
     "sweep": "Measure the designs of a study, on every core or a cluster; list the Pareto front.",
     "export": "Write workspace, parts, models, pages, a figure or code for controllers as files.",
     "report": "Write a report of a design: drawings, slices, tables, and how to reproduce it.",

@@ -94,6 +94,10 @@ def _check_options(command: type[Any], argv: Sequence[str]) -> None:
         known[f"--{option}"] = field.name
         if isinstance(field.default, bool):
             known[f"--no-{option}"] = field.name
+    for part in (part for argument in argv for part in argument.partition("=")):
+        if key := getattr(command, "moved", {}).get(part.replace("_", "-")):
+            need = f"state {key} in a requirement file, and run explorer find NEED.json"
+            raise UsageError(f"{part} asks for machines for a box of positions: {need}")
     given: dict[str, str] = {}
     words: dict[str, list[str]] = {}
     for index, argument in enumerate(argv):

@@ -1,4 +1,4 @@
-"""A measure of a design: its words, unit, sense, cost, function and gradient; and a case of one.
+"""A measure of a design: its words, unit, sense, cost and function; and a case of one.
 
 A case is a design with the intermediate results that several measures share.
 """
@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from explorer.legs.clearance import PAIRS
-from explorer.measures.box import BoxStatics
 from explorer.measures.snapshot import PoseIndices
 from explorer.mechanism.design import LENGTHS, Design
-from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.computed_once import computed_once
 from explorer.numerics.number_text import Unit
 from explorer.statics.compliance import is_elastic
+from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.least_clearance import (
@@ -62,7 +62,6 @@ class Case:
         nodes: Number of nodes on each axis of the grid of node measures.
         margin: Least |δ| at which clearances count; a 20th of the design's reach if None.
         node_step: Step of the paper's nodes; that of the design if None.
-        box: Box (lows, highs) over which the least |δ| is measured; not measured if None.
         demanded_margin: Least |δ| at which a demanded clearance counts; None without demand.
         pose: Pose that has the orientation of the workspace; the home pose if None.
     """
@@ -71,7 +70,6 @@ class Case:
     nodes: int = DEFAULT_NODES
     margin: float | None = None
     node_step: float | None = None
-    box: tuple[Triple, Triple] | None = None
     demanded_margin: float | None = None
     pose: Pose | None = None
 
@@ -165,15 +163,9 @@ class Case:
             return math.nan, str(error)
 
     @cached_property
-    def box_statics(self) -> BoxStatics | None:
-        """Loads, errors and compliance over the required box; None without a box."""
-        return None if self.box is None else BoxStatics(self.design, self.box, self.rotation)
-
-    @cached_property
-    def home_statics(self) -> BoxStatics:
-        """Loads, errors and compliance in the home pose."""
-        home = self.design.home_pose
-        return BoxStatics(self.design, (home.position, home.position), home.rotation)
+    def home_loaded(self) -> LoadedPose:
+        """The home pose under the payload's weight and force; the legs count as weightless."""
+        return LoadedPose(self.design, self.design.home_pose)
 
     @property
     def carried_region(self) -> CarriedRegion:
@@ -211,7 +203,6 @@ Place = Literal["compare", "optimise", "studies", "workspace", "report"]
 Sense = Literal["more", "less"]
 Cost = Literal["low", "high"]
 NEEDS: Mapping[str, tuple[str, Callable[[Case], bool]]] = {
-    "box": ("required box", lambda case: case.box is not None),
     "demanded_margin": ("demanded clearance", lambda case: case.demanded_margin is not None),
     "is_loaded": (
         "payload or force at the tool",
@@ -245,8 +236,6 @@ class Measure:
         cost: "high" if it takes far longer than the exact volume.
         is_whole: Whether it is a count.
         names: Names of the whole numbers from 1, if it is one of several things.
-        gradient: Partial derivatives by the name of the parameter, as in
-            `explorer.workspace.slices.volume.Volume`; None if there is no closed form.
         needs: What the measure needs of a case, out of `NEEDS`.
         reason: Why a workspace that is not empty lacks the value; "" if nothing is known.
         places: Where it is listed.
@@ -263,7 +252,6 @@ class Measure:
     cost: Cost = "low"
     is_whole: bool = False
     names: tuple[str, ...] = ()
-    gradient: Callable[[Case], Mapping[str, float]] | None = None
     needs: tuple[str, ...] = ()
     reason: Callable[[Case], str] = lambda _: ""
     places: tuple[Place, ...] = get_args(Place)

@@ -6,7 +6,7 @@ Lengths are in design units.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, Literal
 
@@ -14,9 +14,8 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
-from explorer.measures.box import box_margins, box_nodes
 from explorer.measures.measure import Case, Measure, Sense, longest_leg
-from explorer.mechanism.design import LENGTHS, VARIABLES, Design
+from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.margins import MARGIN_KINDS, margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
@@ -70,18 +69,6 @@ def _no_clearance(case: Case, legs: str = "") -> str:
     return legs and f"legs {legs} share a joint"
 
 
-def _reach_gradient(case: Case) -> Mapping[str, float]:
-    x, y = case.design.a3
-    reach = case.design.reach
-    return {"a3x": x / reach, "a3y": y / reach}
-
-
-def _longest_leg_gradient(case: Case) -> Mapping[str, float]:
-    limits, longest = case.design.limits, longest_leg(case.design)
-    fixed = [most for name in LENGTHS if (most := getattr(limits, name)[1]) is not None]
-    return {} if longest in fixed else _reach_gradient(case)
-
-
 def _no_nodes_counted(case: Case) -> str:
     try:
         _ = case.paper_nodes
@@ -102,20 +89,11 @@ def _home_margin(case: Case) -> float:
     return float(np.abs(margins(home.position, home.rotation)).min())
 
 
-def _least_tilt(design: Design, positions: FloatArray, rotation: FloatArray) -> float:
-    torsion = tilt_torsion_of(rotation).torsion
-    return float(np.nan_to_num(greatest_tilts(design, positions, torsion)).min())
-
-
 def _home_tilt(case: Case) -> float:
     home = case.design.home_pose
-    return _least_tilt(case.design, np.array(home.position), home.rotation)
-
-
-def _box_tilt(case: Case) -> float:
-    if case.box is None:
-        return math.nan
-    return _least_tilt(case.design, box_nodes(case.box), case.rotation)
+    torsion = tilt_torsion_of(home.rotation).torsion
+    tilts = greatest_tilts(case.design, np.array(home.position), torsion)
+    return float(np.nan_to_num(tilts).min())
 
 
 def _sizes() -> Iterable[Measure]:
@@ -127,7 +105,6 @@ def _sizes() -> Iterable[Measure]:
         lambda case: case.volume.volume,
         title="exact volume",
         power=3,
-        gradient=lambda case: case.volume.gradient,
     )
     yield More(
         "volume_per_leg",
@@ -168,7 +145,6 @@ def _sizes() -> Iterable[Measure]:
         "The distance |a3| from a1 to a3",
         lambda case: case.design.reach,
         sense="less",
-        gradient=_reach_gradient,
         places=("compare", "studies"),
     )
     yield Length(
@@ -177,7 +153,6 @@ def _sizes() -> Iterable[Measure]:
         "The largest maximum length of l1, d2, d4 and l4; the reach where all are tied to it",
         lambda case: longest_leg(case.design),
         sense="less",
-        gradient=_longest_leg_gradient,
         places=("compare", "optimise", "studies"),
     )
     for axis, name in enumerate("xyz"):
@@ -236,16 +211,6 @@ def _margins() -> Iterable[Measure]:
         f"The smallest |δ| in the home pose. {MARGIN_KINDS}",
         _home_margin,
         places=("compare",),
-    )
-    yield Margin(
-        "box_margin",
-        "margin over the box",
-        f"The least |δ| over the required box, 0 where a singular plane meets it. {MARGIN_KINDS}",
-        lambda case: (
-            math.nan if case.box is None else float(box_margins(case.box, case.rotation).min())
-        ),
-        needs=("box",),
-        places=("optimise",),
     )
 
 
@@ -388,16 +353,6 @@ def _orientations() -> Iterable[Measure]:
         unit="°",
         places=("compare", "optimise", "studies", "report"),
     )
-    yield More(
-        "box_tilt",
-        "tilt over the box",
-        "Least of the greatest tilts in every azimuth at the nodes of a grid over the required "
-        "box; 0 if tilt zero violates a limit at one",
-        _box_tilt,
-        unit="°",
-        needs=("box",),
-        places=("optimise",),
-    )
 
 
 def coordinates() -> Iterable[Measure]:
@@ -416,7 +371,6 @@ def coordinates() -> Iterable[Measure]:
             name,
             f"Design variable, in the frame of the {'base' if index < 2 else 'platform'}",
             lambda case, index=index: case.design.variables[index],
-            gradient=lambda _, name=name: {name: 1.0},
             places=("compare",),
         )
 

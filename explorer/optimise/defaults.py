@@ -43,13 +43,6 @@ def make_problem(
     clearance: float | None = None,
     clearance_margin: float | None = None,
     least: float | None = None,
-    stroke_ratio: float | None = None,
-    required_box: problem.Box | None = None,
-    held: bool = False,
-    error: float | None = None,
-    deflection: float | None = None,
-    acceleration: float | None = None,
-    tilt: float | None = None,
     free: Iterable[str] = (),
     bounds: Iterable[problem.Variable] = (),
 ) -> problem.Problem:
@@ -101,13 +94,6 @@ def make_problem(
             clearance=clearance,
             clearance_margin=clearance_margin,
             least=least,
-            stroke_ratio=stroke_ratio,
-            required_box=required_box,
-            held=held,
-            error=error,
-            deflection=deflection,
-            acceleration=acceleration,
-            tilt=tilt,
         ),
     )
 
@@ -120,7 +106,7 @@ def default_variable(start: Design, name: str) -> problem.Variable:
     """
     size = max(map(abs, start.variables))
     value = problem.start_value(start, name)
-    if name in (*VARIABLES, *problem.SHIFTS):
+    if name in VARIABLES:
         within = min(size * (A3_WITHIN if name in ("a3x", "a3y") else 1.0), MOST)
         return problem.Variable(name, -within, within)
     if name == problem.REACH:

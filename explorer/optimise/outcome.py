@@ -6,8 +6,7 @@ libraries. All are plain values, to send to another process or write into a file
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -20,19 +19,18 @@ from explorer.files.packaged import versions
 from explorer.files.writing import read_at_most
 from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.mechanism.design import VARIABLES, Design, Pair
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii
-from explorer.optimise.problem import SHIFTS, ObjectiveName, Problem
+from explorer.optimise.problem import ObjectiveName, Problem
 
 Status = Literal["converged", "not converged", "infeasible", "stalled", "outdone", "cancelled"]
 """Converged: the design has a workspace and meets all demands, which is proven for every position
-of the required box and every azimuth of a tilt, and no design nearby that meets them has a better
-objective. Not converged: the iterations ended first, or a demand is not proven.
-Infeasible: the search found no design that meets all demands. Stalled: the demands are met,
-but no step improves the objective although the conditions of an optimum fail. Outdone: even
-without the clearance demanded, the best design is no better than that of an earlier start.
-Cancelled: `stop` ended the search."""
+of the workspace, and no design nearby that meets them has a better objective. Not converged: the
+iterations ended first, or a demand is not proven. Infeasible: the search found no design that meets
+all demands. Stalled: the demands are met, but no step improves the objective although the
+conditions of an optimum fail. Outdone: even without the clearance demanded, the best design is no
+better than that of an earlier start. Cancelled: `stop` ended the search."""
 
 Phase = Literal["opening", "growing", "solving"]
 """Opening: searching a design whose workspace is not empty. Growing: enlarging the workspace,
@@ -45,8 +43,7 @@ class IterateRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     Attributes:
         number, run: Number from 0 over all runs, and number of the run from 0.
         values: Values of the variables of the problem.
-        objective: F = |1 − V/V′|, or the value of the measure that the objective improves; None
-            if it is infinite.
+        objective: F = |1 − V/V′|, or the value of the measure that the objective improves.
         volume: Exact volume of the workspace, in cubed design units.
         worst: Demand that is missed most, or has the least to spare; "" without demands.
         spare: Value of that demand, dimensionless: below zero where it is missed by more than
@@ -57,7 +54,7 @@ class IterateRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     run: int
     phase: Phase
     values: tuple[float, ...]
-    objective: float | None
+    objective: float
     volume: float
     worst: str
     spare: float
@@ -67,11 +64,6 @@ class Iterate(IterateRecord, frozen=True, kw_only=True):
     """A design that the solver accepted on its way."""
 
     design: Design
-
-    @property
-    def value(self) -> float:
-        """The objective as a number, which may be infinite."""
-        return math.inf if self.objective is None else self.objective
 
 
 class RunSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -221,7 +213,7 @@ def reached_text(problem: Problem, best: Iterate) -> str:
     """Return the name of the objective, and its value in design units to six digits."""
     # F compares numbers of unit size.
     size = 1.0 if problem.objective == "match-volume" else 0.0
-    value = "infinite" if best.objective is None else format_ascii(best.objective, 6, size=size)
+    value = format_ascii(best.objective, 6, size=size)
     return f"{OBJECTIVE_SYMBOLS[problem.objective]} = {value}"
 
 
@@ -274,36 +266,17 @@ def load_record(path: Path) -> Record:
 def compare_designs(
     problem: Problem, before: Design, after: Design
 ) -> tuple[Measurements, Measurements]:
-    """Return the measures of a design, and of one that a search for a problem has found.
-
-    The required box over which they are measured lies where the search began, and where it ended.
-    """
+    """Return the measures of a design, and of one that a search for a problem has found."""
     demands, names = problem.demands, (*measures_in("optimise"), *VARIABLES)
     margin = None if demands.clearance is None else demands.clearance_margin
-    first = Case(before, demanded_margin=margin, box=demands.required_box)
-    second = Case(after, demanded_margin=margin, box=after.required_box)
+    first, second = (Case(each, demanded_margin=margin) for each in (before, after))
     return measure_design(first, names), measure_design(second, names)
-
-
-def box_moves(problem: Problem, values: Sequence[float]) -> Iterator[tuple[str, Pair, Pair]]:
-    """Yield the name of each axis of a required box that may move, and its ends before and after.
-
-    The ends are those at the start, and those to which some values of the variables shift them.
-    """
-    if {*SHIFTS} & {*problem.names}:
-        boxes = (problem.required_box_at(each) for each in (problem.start_values, values))
-        for axis, *ends in zip("xyz", *(zip(*box, strict=True) for box in boxes), strict=True):
-            yield f"required box {axis}", ends[0], ends[1]
 
 
 GOALS: Mapping[ObjectiveName, str] = {
     "match-volume": "volume",
     "smallest-reach": "longest_leg",
     "largest-volume": "volume",
-    "largest-margin": "box_margin",
-    "smallest-load": "load_share",
-    "smallest-error": "worst_error",
-    "smallest-deflection": "deflection",
 }
 """The name in the catalogue of the measure that each objective improves."""
 

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
 import msgspec
-import numpy as np
 
 from explorer.errors import InputError
 from explorer.measures.measure import longest_leg
@@ -19,61 +18,36 @@ from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Desi
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.numerics import checks
 from explorer.numerics.number_text import format_apart
-from explorer.statics.compliance import is_elastic
-from explorer.statics.reactions import part_limits
 from explorer.workspace.limits.table import bounds_angles
 
-ObjectiveName = Literal[
-    "match-volume",
-    "smallest-reach",
-    "largest-volume",
-    "largest-margin",
-    "smallest-load",
-    "smallest-error",
-    "smallest-deflection",
-]
+ObjectiveName = Literal["match-volume", "smallest-reach", "largest-volume"]
 
 OBJECTIVES: tuple[ObjectiveName, ...] = get_args(ObjectiveName)
 """Objectives: to match the demanded volume (the paper's F = |1 − V/V′|), the shortest longest leg
-for it, the largest volume, the largest worst margin over the required box, and over that box the
-smallest largest share of a limit under the design's load, the smallest worst error, and the
-smallest deflection under that load."""
-
-OF_THE_MACHINE = OBJECTIVES[4:]
-"""Objectives that are about the machine around the mechanism."""
-
-OVER_BOX = OBJECTIVES[3:]
-"""Objectives that are the worst of several values over the required box."""
+for it, and the largest volume."""
 
 YAW = "yaw"
 REACH = "reach"
-SHIFTS = ("shift-x", "shift-y", "shift-z")
-OPTIONAL = (YAW, REACH, *SHIFTS)
-"""Variables besides the six of a design: the yaw of home in degrees, one maximum for all four
-lengths, and the shift of the required box along each axis."""
+OPTIONAL = (YAW, REACH)
+"""Variables besides the six of a design: the yaw of home in degrees, and one maximum for all four
+lengths."""
 
 SWING_LIMIT, MAXIMA = "swing", "maximum lengths"
-NO_LOAD, NO_ERRORS, RIGID = "no load", "no errors", "rigid"
-"""The obstacles to a start: bounds of the swing, fixed maxima, or what it lacks."""
+"""The limits that keep a search from a start: bounds of the swing, or fixed maxima."""
 
 # Least value of the reach as a variable, as a share of the start's.
 LEAST_REACH = 1e-3
 
 
 class DesignStartError(InputError):
-    """A design from which a problem cannot start, for a limit or a lack such as `NO_LOAD`."""
+    """A design from which a problem cannot start, for a limit such as `SWING_LIMIT`."""
 
-    def __init__(self, message: str, limit: str = "") -> None:
+    def __init__(self, message: str, limit: str) -> None:
         super().__init__(message)
         self.limit = limit
 
 
 Box = tuple[Triple, Triple]
-
-MOST_TILT = 90.0
-# The demands that are positive numbers.
-SIZES = ("volume", "reach", "clearance", "stroke_ratio")
-POSITIVE = (*SIZES, "error", "deflection", "acceleration", "tilt")
 
 
 class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -87,19 +61,6 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
             legs may have to meet: with a level platform all four lie in the base at δ3 = 0.
         clearance_margin: Least margin at which clearance is demanded, in design units.
         least: Smallest |a3y|, |b1y| and |b3 − b2|, at zero of which a design is degenerate.
-        stroke_ratio: Longest over shortest of each actuator: raises its minimum length to
-            its maximum over this ratio, so that the workspace is what such strokes reach.
-        required_box: (lows, highs) of positions that must lie in the workspace.
-        held: Whether the design's load must be held over the required box, within the limits of
-            its actuators, struts and guide.
-        tilt: Tilt from the orientation of home that the required box must allow in every azimuth,
-            and at every smaller tilt, in degrees.
-        error: Worst displacement of the tool by the actuators' errors over the required box, in
-            design units.
-        deflection: Largest displacement of the tool under the design's load over the required box,
-            in design units.
-        acceleration: Least of the largest accelerations from rest in every direction over the
-            required box, in m/s².
     """
 
     volume: float | None = None
@@ -107,28 +68,17 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     clearance: float | None = None
     clearance_margin: float = 0.0
     least: float = 0.0
-    stroke_ratio: float | None = None
-    required_box: Box | None = None
-    held: bool = False
-    error: float | None = None
-    deflection: float | None = None
-    acceleration: float | None = None
-    tilt: float | None = None
 
     def __post_init__(self) -> None:
-        for field in POSITIVE:
+        for field in ("volume", "reach", "clearance"):
             value = getattr(self, field)
             if value is not None:
-                label = f"the {field.replace('_', ' ')} demanded"
+                label = f"the {field} demanded"
                 most = math.inf if field == "volume" else checks.MOST
                 msgspec.structs.force_setattr(self, field, checks.positive(label, value, most))
         for field in ("clearance_margin", "least"):
             value = checks.not_negative(f"the {field.replace('_', ' ')}", getattr(self, field))
             msgspec.structs.force_setattr(self, field, value)
-        msgspec.structs.force_setattr(self, "held", bool(self.held))
-        if self.required_box is not None:
-            required = checks.box("the required box", self.required_box)
-            msgspec.structs.force_setattr(self, "required_box", required)
 
 
 class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -151,9 +101,9 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     It starts from a design; what is no variable, the home pose too, stays the same in all designs.
 
     Raises:
-        StartError: A start that its limits, or what it lacks, keep from a search.
+        DesignStartError: A start that its limits keep from a search.
         InputError: Bounds that cross or leave the start out, numbers that are not finite or
-            out of range, or an objective that nothing free has an influence on.
+            out of range, or an objective that lacks its volume.
     """
 
     start: Design
@@ -194,25 +144,12 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return tuple(start_value(self.start, variable.name) for variable in self.variables)
 
     def design_at(self, values: Iterable[float]) -> Design:
-        """Return the design with these values of the variables, and with the required box there.
+        """Return the design with these values of the variables.
 
         Raises:
             DesignError: The values make a degenerate design.
         """
-        given = dict(zip(self.names, values, strict=True))
-        design = with_strokes(with_values(self.start, given), self.demands.stroke_ratio)
-        box = self.demands.required_box and self.required_box_at(given.values())
-        unchanged = box == design.required_box
-        return design if unchanged else msgspec.structs.replace(design, required_box=box)
-
-    def required_box_at(self, values: Iterable[float]) -> Box:
-        """Return the required box where these values shift it to; an InputError without one."""
-        if self.demands.required_box is None:
-            raise InputError("this problem requires no box within the workspace")
-        given = dict(zip(self.names, values, strict=True))
-        x, y, z = (given.get(name, 0.0) for name in SHIFTS)
-        (ax, ay, az), (bx, by, bz) = self.demands.required_box
-        return (ax + x, ay + y, az + z), (bx + x, by + y, bz + z)
+        return with_values(self.start, dict(zip(self.names, values, strict=True)))
 
 
 def with_values(design: Design, values: Mapping[str, float]) -> Design:
@@ -239,17 +176,6 @@ def with_box(design: Design, box: Box | None) -> Design:
     return msgspec.structs.replace(design.with_limits(box=box), home=design.home_pose)
 
 
-def with_strokes(design: Design, ratio: float | None) -> Design:
-    """Return a design with minimum lengths that keep a ratio, longest over shortest, if any."""
-    if ratio is None:
-        return design
-    ranges: dict[str, tuple[float, float | None]] = {}
-    for name in LENGTHS:
-        low, high = getattr(design.limits, name)
-        ranges[name] = max(low, design.length_range(name)[1] / ratio), high
-    return design.with_limits(**ranges)
-
-
 def distances_of(design: Design) -> dict[str, float]:
     """Return the signed distances at zero of which a design is degenerate, in design units."""
     return {"a3y": design.a3[1], "b1y": design.b1[1], "b3 − b2": design.b3 - design.b2}
@@ -263,8 +189,6 @@ def start_value(start: Design, name: str) -> float:
         return float(yaw_pitch_roll_from_rotation(start.home_pose.rotation)[0])
     if name == REACH:
         return longest_leg(start)
-    if name in SHIFTS:
-        return 0.0
     raise InputError(f"no variable {name!r}; there are {', '.join((*VARIABLES, *OPTIONAL))}")
 
 
@@ -298,8 +222,6 @@ def _check_variables(problem: Problem) -> None:
                 "the reach must stay above every minimum length, so its low bound above "
                 f"{least}; got {low}"
             )
-        if variable.name in SHIFTS and problem.demands.required_box is None:
-            raise InputError(f"{variable.name} shifts the required box, and none is given")
 
 
 def _check_demands(problem: Problem) -> None:
@@ -309,10 +231,6 @@ def _check_demands(problem: Problem) -> None:
             "clearance can be demanded only off the singular planes, where legs may have to "
             "meet: give a positive clearance margin"
         )
-    _check_statics(problem)
-    ratio = demands.stroke_ratio
-    if ratio is not None and not ratio > 1.0:
-        raise InputError(f"a stroke ratio is longest over shortest, above 1; got {ratio:g}")
     for name, distance in distances_of(problem.start).items():
         # A start made of rounded numbers may lie on the bound.
         if abs(distance) < demands.least * (1.0 - DEGENERATE_RATIO):
@@ -323,57 +241,14 @@ def _check_demands(problem: Problem) -> None:
             )
 
 
-def _check_statics(problem: Problem) -> None:
-    demands, design = problem.demands, problem.start
-    needs_load = demands.held or problem.objective == "smallest-load"
-    moves = demands.acceleration is not None
-    needs_error = demands.error is not None or problem.objective == "smallest-error"
-    bends = demands.deflection is not None or problem.objective == "smallest-deflection"
-    needs_box = needs_load or needs_error or bends or moves or demands.tilt is not None
-    if needs_box and demands.required_box is None:
-        raise InputError(
-            "loads, errors, deflections, accelerations and tilts are demanded over a required box, "
-            "and none is given"
-        )
-    if demands.tilt is not None and not demands.tilt < MOST_TILT:
-        raise InputError(f"the tilt demanded must be below {MOST_TILT:g}°; got {demands.tilt:g}°")
-    if (needs_load or bends) and not (design.payload.mass_kg or design.payload.force_n):
-        raise DesignStartError(
-            "the design has no load: give its payload a mass, or a force of any direction", NO_LOAD
-        )
-    if moves and not design.payload.mass_kg:
-        raise DesignStartError(
-            "the design has no mass to accelerate: give its payload a mass", NO_LOAD
-        )
-    if (needs_load or moves) and np.isinf(part_limits(design)).all():
-        raise DesignStartError(
-            "the design limits neither its actuators nor its struts nor its guide: give a limit "
-            "of forces or moments",
-            NO_LOAD,
-        )
-    if needs_error and not any(design.actuators.error_mm):
-        raise DesignStartError("the actuators of the design have no errors: give them", NO_ERRORS)
-    if bends and not is_elastic(design):
-        raise DesignStartError(
-            "the design is rigid: give its actuators a stiffness, or its struts a diameter", RIGID
-        )
-
-
 def _check_objective(problem: Problem) -> None:
     objective, names, demands = problem.objective, problem.names, problem.demands
     if objective in ("match-volume", "smallest-reach") and demands.volume is None:
         raise InputError(f"{objective} needs a volume")
-    if objective == "largest-margin" and demands.required_box is None:
-        raise InputError("largest-margin needs a required box to be margins over")
     is_tied = all(getattr(problem.start.limits, name)[1] is None for name in LENGTHS)
     if objective == "smallest-reach" and not (REACH in names or is_tied):
         raise DesignStartError(
             "the design fixes maximum lengths: tie them to the reach |a3|, or let the reach change "
             "as a variable of its own",
             MAXIMA,
-        )
-    if objective == "largest-margin" and not {YAW, *SHIFTS} & {*names}:
-        raise InputError(
-            "margins do not depend on the design variables: let the yaw or the place of the "
-            "required box (shift-x, shift-y, shift-z) change"
         )

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from explorer.measures.box import box_margins
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.mechanism.design import Design
@@ -192,7 +193,7 @@ def measure_search() -> Measurement:
     margin = defaults.paper_problem().demands.clearance_margin
 
     def measure(design: Design) -> Measurements:
-        case = Case(design, demanded_margin=margin, box=BOX, node_step=STEP)
+        case = Case(design, demanded_margin=margin, node_step=STEP)
         return measure_design(case, (*measures_in("optimise"), "reach", "node_step"))
 
     optimal = measure(PRESETS["paper-optimal"])
@@ -232,13 +233,14 @@ def measure_search() -> Measurement:
 def _values(optimum: Optimum) -> Values:
     """Return an optimum as plain values; None is not available."""
     measured = optimum.measured
-    names = ("volume", "node_step", "node_count", "node_volume", "reach", "box_margin")
+    names = ("volume", "node_step", "node_count", "node_volume", "reach")
     return {
         "name": optimum.name,
         "iterations": optimum.iterations,
         "objective": optimum.objective,
         "variables": measured.design.variables,
         **{name: measured[name] for name in names},
+        "box_margin": _box_margin(measured.design),
         "clearance": measured["least_clearance"],
         "demanded_clearance": measured["demanded_clearance"],
     }
@@ -249,7 +251,7 @@ def _table(optima: Sequence[Optimum]) -> list[str]:
     lines = [f"{'':34}" + "".join(f"{head:>13}" for head in heads)]
     for optimum in optima:
         measured, objective = optimum.measured, optimum.objective
-        reach, margin = measured["reach"], measured["box_margin"]
+        reach, margin = measured["reach"], _box_margin(measured.design)
         small = objective is not None and objective < MATCHED
         cells = (
             _cell(optimum.iterations, "d"),
@@ -257,7 +259,7 @@ def _table(optima: Sequence[Optimum]) -> list[str]:
             _cell(measured["volume"], ".2f"),
             _cell(measured["node_count"], "d"),
             _cell(reach, ".3f"),
-            _cell(margin and reach and margin / reach, ".3f"),
+            _cell(reach and margin / reach, ".3f"),
             _cell(measured["demanded_clearance"], ".3f"),
         )
         lines.append(f"{optimum.name:34}" + "".join(f"{cell:>13}" for cell in cells))
@@ -273,6 +275,11 @@ def _table(optima: Sequence[Optimum]) -> list[str]:
         f"Margin: the worst over the box ({low}) to ({high}).",
         f"Smallest reach: the best of {STARTS} starts, |b1y|, a3y and |b3 − b2| at least 1.",
     ]
+
+
+def _box_margin(design: Design) -> float:
+    """Return the least |δ| over the box about the home position, in design units."""
+    return float(box_margins(BOX, design.home_pose.rotation).min())
 
 
 def _cell(value: float | None, form: str) -> str:

@@ -115,20 +115,6 @@ def limit_shares(design: Design, result: Reactions) -> FloatArray:
     return np.where(is_regular, np.maximum(up, down), np.inf)
 
 
-def utilisations_in_motion(configuration: Configuration, acceleration: float = 0.0) -> FloatArray:
-    """Return the utilisations with the payload of a design, (..., 12), as `limit_shares` does.
-
-    The platform accelerates from rest by as much in the worst direction for each part, in m/s²,
-    without turning, as for `largest_accelerations`.
-    """
-    payload = configuration.design.payload
-    held = payload_reactions(configuration)
-    if acceleration:
-        effect = _effect(configuration, held.spread.shape[:-1], payload.centre)
-        held = held._replace(spread=held.spread + acceleration * payload.mass_kg * effect)
-    return limit_shares(configuration.design, held)
-
-
 def part_limits(design: Design) -> FloatArray:
     """Return the largest and, with a minus, the least values of loaded parts, shape (2, 10).
 
@@ -141,15 +127,10 @@ def part_limits(design: Design) -> FloatArray:
     return np.array([[*most, *moments, *limits[2:4]] for most in design.actuators.limits])
 
 
-def least_limits(design: Design) -> FloatArray:
-    """Return the smaller limit of each part of `LIMITED`, shape (12,); infinite without one."""
-    push, pull = design.actuators.limits
-    return np.concatenate([np.minimum(push, pull), _limits(design)])
-
-
 def limited_parts(design: Design) -> BoolArray:
     """Return whether each part of `LIMITED` has a limit, shape (12,)."""
-    return np.isfinite(least_limits(design))
+    push, pull = design.actuators.limits
+    return np.isfinite(np.concatenate([np.minimum(push, pull), _limits(design)]))
 
 
 def has_limits(design: Design) -> bool:

@@ -21,7 +21,6 @@ from explorer.app.features.optimise.actions import (
     StartRun,
 )
 from explorer.app.features.optimise.state import (
-    PLACE,
     Optimisation,
     OptimisationRequest,
     SearchResult,
@@ -123,9 +122,8 @@ def _request(_: State, i: int, share: float) -> Action:
         {
             "volume": None if i == 0 else 1.0 + 1e4 * share,
             "clearance": share,
-            "free": (VARIABLES[i], YAW, PLACE),
+            "free": (VARIABLES[i], YAW),
             "starts": i + 1,
-            "box": None if i < 3 else ((0.0, 0.0, 0.0), (share + 1.0, 2.0, 1 / 3)),
         },
     )
 
@@ -238,8 +236,7 @@ def iterates_of(state: State, count: int) -> tuple[Iterate, ...]:
                 phase="solving",
                 design=problem.design_at(values),
                 values=values,
-                # Loads are infinite where a box is on a singular plane.
-                objective=None if number % 5 == 3 else 1.0 / (1.0 + number % 5),
+                objective=1.0 / (1.0 + number % 5),
                 volume=8000.0 / 3.0 + number,
                 worst="clearance of legs 2 and 3" if number % 2 else "",
                 spare=-0.25 if number % 3 == 1 else 1.0 / 3.0,
@@ -256,14 +253,7 @@ def rich_state() -> State:
     state = open_state(msgspec.structs.replace(OPTIMAL, name="é «one»", limits=limits, home=home))
     request = vars(varied(OptimisationRequest())) | {
         "volume": 1e4 / 3,
-        "free": (VARIABLES[4], YAW, PLACE),
-        "box": ((0.0, 0.0, 0.0), (4 / 3, 2.0, 1 / 3)),
-        # The design has no load, no mass, no errors and no stiffness to search with.
-        "held": False,
-        "error": 0.0,
-        "deflection": 0.0,
-        "acceleration": 0.0,
-        "tilt": 0.0,
+        "free": (VARIABLES[4], YAW),
     }
     actions: list[Action | Callable[[State], Action]] = [
         Change("optimisation.request", request),
@@ -286,16 +276,6 @@ def rich_state() -> State:
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),
         BrushAxes((Brush("volume", ((1 / 3, 10.0),)),)),
-        Change(
-            "optimisation.request",
-            {
-                "held": True,
-                "error": 1 / 3,
-                "deflection": 2 / 3,
-                "acceleration": 4 / 3,
-                "tilt": 10 / 3,
-            },
-        ),
         SetFold(4, 100 / 3),
         SetJoint(0, 99.1),
     ]

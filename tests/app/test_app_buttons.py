@@ -30,7 +30,7 @@ from socket_tab import SocketTab
 
 from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.optimise import runner
-from explorer.app.features.optimise.actions import SetRequest, StartRun
+from explorer.app.features.optimise.actions import StartRun
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchResult
 from explorer.app.features.paths.actions import Go, Play
 from explorer.app.features.paths.state import journey_of
@@ -236,7 +236,7 @@ def test_search_and_its_answer_leave_one_filled_button_at_most(
     # No iterate is drawn, so that the page comes to rest during the search.
     monkeypatch.setattr(runner, "PACE", 600.0)
     session = running.page.session
-    session.do(SetRequest("optimisation.request", ENDLESS))
+    session.do(Set("optimisation.request", ENDLESS))
     session.do(StartRun())
     wait_for(lambda: Optimisation.of(session.state).is_on)
     check_filled(running)

@@ -43,14 +43,13 @@ LENGTHS = (
     *(f"design.limits.leg_radii.{leg}" for leg in range(4)),
     *("view.warn_below", "view.workspace.level", "view.workspace.tolerance"),
     *(f"paths.{end}.position.{axis}" for end in ("start", "goal") for axis in range(3)),
-    *(f"optimisation.request.{name}" for name in ("reach", "clearance", "error", "deflection")),
-    *(f"optimisation.request.box.{end}.{axis}" for end in range(2) for axis in range(3)),
+    *(f"optimisation.request.{name}" for name in ("reach", "clearance")),
 )
 """The lengths that stay, by their paths."""
 
 IN_OTHER_UNITS = """
 paths: seconds, duration, request
-optimisation.request: starts, acceleration, tilt
+optimisation.request: starts
 view.prototype: exploded, density
 view.orientation: range, turn
 view.forces: force, moment, scale
@@ -83,10 +82,7 @@ def asked() -> State:
         tolerances=Tolerances(a1=(0.1, 0.2, 0.3)),
     )
     start, goal = (Pose((9.0, y, 9.0), OPTIMAL.home_pose.quaternion) for y in (5.0, 6.5))
-    request = OptimisationRequest(
-        volume=900.0, reach=19.0, clearance=0.3, box=((5.0, 2.0, 7.0), (15.0, 8.0, 11.0)),
-        error=0.07, deflection=0.11, tilt=5.0,
-    )  # fmt: skip
+    request = OptimisationRequest(volume=900.0, reach=19.0, clearance=0.3)
     state = with_value(open_state(design), "paths", Paths(start, goal, "planned", holds_load=True))
     state = with_value(state, "optimisation.request", request)
     for path, value in (
@@ -123,7 +119,7 @@ def test_presets_and_unit_of_the_page_keep_payload_actuators_and_demands(
     for handle, name, value in panel.updates(Frame(desk.state)):
         setattr(handle, name, value)
         named[getattr(handle, "label", "")] = handle
-    asked = with_value(asked, "optimisation.request.box", ((5.0, 2.0, 7.0), (25.0, 8.0, 11.0)))
+    asked = with_value(asked, "optimisation.request.reach", 25.0)
     desk.session.do(Open(asked.design))
     desk.session.do(Set("optimisation", Optimisation.of(asked)))
     desk.session.do(Set("view", asked.view))
@@ -132,9 +128,7 @@ def test_presets_and_unit_of_the_page_keep_payload_actuators_and_demands(
         state = desk.state
         assert state.design.payload.mass_kg == FULL.payload.mass_kg
         assert machine_of(state.design)[2:] == machine_of(asked.design)[2:]
-        box = Optimisation.of(state).request.box
-        assert box is not None
-        assert state.design.unit_mm * (box[1][0] - box[0][0]) == 200.0
+        assert state.design.unit_mm * (Optimisation.of(state).request.reach or 0.0) == 250.0
     assert state.design.unit_mm == 40.0
     assert state.design.variables == INITIAL.variables
 
@@ -166,14 +160,16 @@ def test_millimetres_that_were_asked_for_stay_in_another_unit(
         assert getattr(after.design, name) == getattr(asked.design, name)
     assert after.design.payload.mass_kg == asked.design.payload.mass_kg
     request, before = Optimisation.of(after).request, Optimisation.of(asked).request
-    assert (request.tilt, request.free) == (before.tilt, before.free)
+    assert request.free == before.free
     assert after.view.forces == asked.view.forces
-    # What is shown as 200 mm is 200 again, and not 199.99999999999997.
-    text = after.unit.convert(request.box[1][0]) if request.box else 0.0
-    assert text == 150.0
-    # A preset has no box that a search required; of the same design it is where it was.
-    assert after.design.required_box == (None if is_preset else request.box)
-    if not is_preset:
+    # What is shown as 190 mm is 190 again, and not 189.99999999999997.
+    assert after.unit.convert(request.reach or 0.0) == 190.0
+    # A preset has no required box; that of the same design is where it was.
+    if is_preset:
+        assert after.design.required_box is None
+    else:
+        assert after.design.required_box is not None
+        assert after.unit.convert(after.design.required_box[1][0]) == 150.0
         assert after.design.variables == asked.design.variables
         assert after.design.limits.box == asked.design.limits.box
         assert (after.pose, after.joints, after.base) == (asked.pose, asked.joints, asked.base)
@@ -235,8 +231,7 @@ def _is_number(value: Any) -> bool:
 
 def test_every_number_of_view_paths_and_request_is_a_declared_length_or_none() -> None:
     paths = Paths(OPTIMAL.home_pose, OPTIMAL.home_pose)
-    box = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-    request = replace(varied(OptimisationRequest()), box=box, free=())
+    request = replace(varied(OptimisationRequest()), free=())
     lines = [line.split(": ") for line in IN_OTHER_UNITS.strip().splitlines()]
     others = {f"{part}.{name}" for part, names in lines for name in names.split(", ")}
     found = dict(
@@ -257,8 +252,6 @@ def test_state_with_everything_in_it_takes_another_unit_and_a_preset() -> None:
 
 
 def test_result_that_is_given_up_after_another_unit_leaves_what_was_shown(asked: State) -> None:
-    request = replace(Optimisation.of(asked).request, error=0.0, deflection=0.0, tilt=0.0)
-    asked = with_value(asked, "optimisation.request", request)
     state = StartRun().apply(asked)
     iterates = iterates_of(state, 2)
     end = EndRun(1, SearchResult("converged", "It ended.", iterates[-1]), iterates)

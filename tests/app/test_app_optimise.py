@@ -23,7 +23,6 @@ from limited_designs import limited
 from sample_states import iterates_of
 from services import services_for
 
-from explorer import Actuators, Payload, Struts
 from explorer.app.features.optimise import runner as optimiser
 from explorer.app.features.optimise.actions import (
     Accept,
@@ -33,7 +32,6 @@ from explorer.app.features.optimise.actions import (
     EndRun,
     LiftLimit,
     Revert,
-    SetRequest,
     StartRun,
     TakePaperBox,
 )
@@ -45,7 +43,6 @@ from explorer.app.features.optimise.feature import (
 )
 from explorer.app.features.optimise.runner import Optimiser, result_of
 from explorer.app.features.optimise.state import (
-    PLACE,
     Optimisation,
     OptimisationRequest,
     SearchRun,
@@ -57,21 +54,19 @@ from explorer.app.features.optimise.words import (
     search_notice,
 )
 from explorer.app.features.optimise.work import (
-    box_within,
     complete_request,
     find_refusals,
     is_paper_box_on_offer,
     liftable_limits,
     optimise,
     problem_of,
-    requested_box,
 )
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.server import start as start_page
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Action, Open, Reset, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable, set_unit
+from explorer.app.state.geometry import SetVariable
 from explorer.app.state.moves import SetAngle, SetJoint, SetPosition
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
@@ -81,32 +76,19 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.jobs.jobs import Jobs
 from explorer.jobs.process import Channel
-from explorer.measures.box import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
-from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
-from explorer.numerics.number_text import UNITS, format_number
+from explorer.mechanism.design_file import PRESETS
+from explorer.numerics.number_text import UNITS
 from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate, compare_designs, curves_of
-from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
+from explorer.optimise.problem import MAXIMA, OBJECTIVES, SWING_LIMIT, YAW
 from explorer.optimise.search.sqp import Trail
-from explorer.workspace.limits.constraints import slacks
-from explorer.workspace.limits.table import GAP
 from explorer.workspace.slices.volume import workspace_volume
-from explorer.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 INITIAL, OPTIMAL = PRESETS["paper-initial"], PRESETS["paper-optimal"]
-MACHINE = msgspec.structs.replace(
-    OPTIMAL,
-    payload=Payload(force_n=1.0),
-    actuators=Actuators((50.0, 50.0, 50.0, 50.0, 50.0, 50.0), error_mm=(0.01,) * 6),  # pyright: ignore[reportArgumentType]
-    struts=Struts(outer_mm=12.0),
-)
 SMALL = OptimisationRequest(volume=8000.0)
-MARGIN = OptimisationRequest(objective="largest-margin")
-MOVE = (0.5, -0.25, 1.0)
-OTHER_BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
 # With so many starts a search goes on until it is ended.
 ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=10_000)
 
@@ -118,7 +100,7 @@ def own_state() -> State:
 
 
 def ask(request: OptimisationRequest, state: State) -> State:
-    return SetRequest("optimisation.request", request).apply(state)
+    return Set("optimisation.request", request).apply(state)
 
 
 def start(request: OptimisationRequest = SMALL, state: State | None = None) -> State:
@@ -160,13 +142,6 @@ def buttons_of(state: State) -> dict[str, str]:
         is_filled = "is-main" in tag
         looks[name] = "disabled" if " disabled" in tag else "filled" if is_filled else "enabled"
     return looks
-
-
-def moved_iterate(state: State) -> Iterate:
-    """Return an iterate of a run with the required box moved, where only its place is free."""
-    problem = run_of(state).problem
-    first = iterates_of(state, 1)[0]
-    return msgspec.structs.replace(first, values=MOVE, design=problem.design_at(MOVE))
 
 
 def filled_buttons(state: State) -> list[str]:
@@ -215,7 +190,7 @@ class Bench(Desk):
 
     def search(self, request: OptimisationRequest, iterates: int) -> int:
         """Start a search, wait for some iterates, and return the number of its process."""
-        self.do(Open(paper_start()), SetRequest("optimisation.request", request))
+        self.do(Open(paper_start()), Set("optimisation.request", request))
         self.push(START)
         self.wait(lambda s: Optimisation.of(s).is_on and len(run_of(s).iterates) >= iterates)
         return self.jobs.process_ids(optimiser.SEARCH)[0]
@@ -249,7 +224,7 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     run = run_of(bench.wait(lambda s: Optimisation.of(s).run is not None and not s.busy))
     assert run.has_converged
     best = best_of(run)
-    assert best.value <= 1e-6
+    assert best.objective <= 1e-6
     assert abs(workspace_volume(best.design).volume / 8000.0 - 1.0) <= 1e-6
     run = run_of(bench.wait(lambda state: run_of(state).comparison is not None))
     state, got, known = bench.state, run.comparison, run_of(found).comparison
@@ -312,7 +287,7 @@ def test_search_under_way_is_kept_when_the_explorer_stops(
     monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
     running = start_page(paper_start(), port=0, user_data=open_user_data(resume=True))
     session = running.page.session
-    for action in (SetRequest("optimisation.request", ENDLESS), StartRun()):
+    for action in (Set("optimisation.request", ENDLESS), StartRun()):
         session.do(action)
     wait_for(lambda: len(getattr(Optimisation.of(session.state).run, "iterates", ())) >= 3)
     running.stop()
@@ -440,40 +415,29 @@ def test_opening_another_design_forgets_the_run_and_keeps_the_request() -> None:
 # Problems, and what rules them out
 
 
-def test_only_free_variables_change_and_those_of_margins_influence_them() -> None:
+def test_only_free_variables_change() -> None:
     state = start(replace(SMALL, free=("a3x", "b1y")))
     last = iterates_of(state, 3)[-1]
     both = zip(VARIABLES, paper_start().variables, last.design.variables, strict=True)
     assert [name for name, old, new in both if old != new] == ["a3x", "b1y"]
-    assert {YAW, PLACE} <= {*Optimisation.of(ask(MARGIN, own_state())).request.free}
-    assert {"shift-x", "shift-y", "shift-z", YAW} <= {*run_of(start(MARGIN)).problem.names}
 
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_suggested_values_suit_the_design(name: str) -> None:
     state = open_state(PRESETS[name])
-    design, home = state.design, state.design.home_pose
+    design = state.design
     volume = workspace_volume(design).volume
     asked = complete_request(state)
     assert 1.05 * volume < (asked.volume or 0.0) < 2.3 * volume
     assert asked.reach == design.reach
     same = ask(OptimisationRequest(objective="smallest-reach"), state)
     assert complete_request(same).volume == pytest.approx(volume, rel=1e-5)
-    box = requested_box(state)
-    assert box == box_within(design)
-    lows, highs = np.array(box)
-    assert (lows < home.position).all()
-    assert (home.position < highs).all()
-    for corner in corners_of(box):
-        assert slacks(Workspace(design, home.rotation).limits, corner).min() >= 0.0
 
 
 @pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_default_demands_can_be_kept_by_every_preset(name: str, objective: Any) -> None:
-    machine = {key: getattr(MACHINE, key) for key in ("payload", "actuators", "struts")}
-    design = msgspec.structs.replace(PRESETS[name], **machine)
-    state = ask(OptimisationRequest(objective=objective), open_state(design))
+    state = ask(OptimisationRequest(objective=objective), open_state(PRESETS[name]))
     assert find_refusals(state) == ()
     assert liftable_limits(state) == ()
     assert StartRun().apply(state).busy
@@ -483,7 +447,18 @@ def test_default_demands_can_be_kept_by_every_preset(name: str, objective: Any) 
     ("design", "request_", "limit", "title"),
     [
         (INITIAL, SMALL, "box", "Lift the box"),
-        (limited(OPTIMAL, box=None, gap=30.0), SMALL, GAP, "Lift the gap"),
+        (
+            limited(OPTIMAL, l1=(0.0, 12.0)),
+            SMALL,
+            "l1 maximum",
+            "Tie the maximum of l1 to the reach",
+        ),
+        (
+            limited(OPTIMAL, l1=(0.0, 25.0)),
+            OptimisationRequest(objective="smallest-reach"),
+            MAXIMA,
+            "Tie all maximum lengths to the reach",
+        ),
         (
             limited(OPTIMAL, swing=Swing(a1=30.0)),
             OptimisationRequest(),
@@ -543,46 +518,6 @@ def test_limits_in_force_are_listed_and_no_others() -> None:
 # What is shown
 
 
-def test_place_that_a_search_found_is_in_fields_table_and_design_until_it_is_reverted() -> None:
-    before = ask(replace(MARGIN, free=(PLACE,)), own_state())
-    state = StartRun().apply(before)
-    box, run = requested_box(state), run_of(state)
-    best = moved_iterate(state)
-    moved = run.problem.required_box_at(MOVE)
-    ended = end(state, (best,))
-    accepted = Accept().apply(ended)
-    for each in (ended, accepted):
-        assert requested_box(each) == each.design.required_box == moved
-        assert decode_design(encode_design(each.design), "it").required_box == moved
-    both = compare_designs(run.problem, run.own.design, best.design)
-    compared = run_of(Compare(run.number, both).apply(accepted))
-    rows = {row[0]: row[1:] for row in rows_of(comparison_table(compared, View()))}
-    for axis, *ends, way in zip("xyz", box[0], moved[0], MOVE, strict=True):
-        cells = [format_number(10.0 * end, 5) for end in (*ends, way)]
-        cells[2] = f"{'+' * (way > 0.0)}{cells[2]}"
-        assert rows[f"required box {axis} from mm"] == cells
-    # A search that goes on from there begins there, and both lead back to the own box.
-    again = StartRun().apply(ended)
-    assert run_of(again).problem.demands.required_box == moved
-    in_unit = set_unit(ended, 4.0).apply(ended)
-    assert requested_box(in_unit) != moved
-    for each in (ended, in_unit, end(again, (moved_iterate(again),))):
-        reverted = Revert().apply(each)
-        assert requested_box(reverted) == box
-        assert Optimisation.of(reverted).request == Optimisation.of(before).request
-        assert reverted.design == before.design
-    # What the user types meanwhile stays.
-    typed = SetRequest("optimisation.request.box", OTHER_BOX).apply(ended)
-    for action in (Accept(), Revert()):
-        assert requested_box(action.apply(typed)) == OTHER_BOX
-
-
-def test_design_opened_with_a_required_box_suggests_it() -> None:
-    design = msgspec.structs.replace(OPTIMAL, required_box=OTHER_BOX)
-    assert requested_box(open_state(design)) == OTHER_BOX
-    assert complete_request(open_state(design)).box == OTHER_BOX
-
-
 def test_table_shows_old_and_new_and_their_difference(found: State) -> None:
     run = run_of(found)
     assert run.comparison is not None
@@ -625,4 +560,4 @@ def test_charts_are_of_one_start_and_of_the_demands() -> None:
     first, second = iterates_of(small, 2)
     ended = run_of(end(small, (first, msgspec.structs.replace(second, objective=0.0))))
     powers = curves_of(ended.problem, charted_iterates(ended))[0].values
-    assert powers.tolist() == [np.log10(first.value), -16.0]
+    assert powers.tolist() == [np.log10(first.objective), -16.0]

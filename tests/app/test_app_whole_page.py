@@ -17,7 +17,7 @@ from sample_states import Sample, samples
 from server_clock import wait_until_drawn
 
 from explorer.app.features.compare.feature import Pin
-from explorer.app.features.optimise.actions import Accept, SetRequest, StartRun
+from explorer.app.features.optimise.actions import Accept, StartRun
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest
 from explorer.app.features.paths.state import Paths
 from explorer.app.server import Running
@@ -155,7 +155,7 @@ def is_compared(state: State) -> bool:
 def test_name_has_one_value_after_an_optimum_and_after_a_turn(running: Running) -> None:
     page, session = running.page, running.page.session
     request = OptimisationRequest(objective="smallest-reach", volume=7053.0)
-    session.do(SetRequest("optimisation.request", request))
+    session.do(Set("optimisation.request", request))
     session.do(StartRun())
     wait_for(lambda: is_compared(session.state))
     for action in (

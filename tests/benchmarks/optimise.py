@@ -130,7 +130,7 @@ def _random_starts(name: str, clearance: float | None) -> Row:
         optimise_design(msgspec.structs.replace(problem, start=problem.design_at(values)))
         for values in more_starts(problem, RANDOM_STARTS, seed=1)
     ]
-    good = sum(each.converged and each.best.value <= CONVERGED for each in found)
+    good = sum(each.converged and each.best.objective <= CONVERGED for each in found)
     steps = np.median([each.iterations for each in found])
     duration = float(np.median([each.seconds for each in found]))
     return Row(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -12,8 +13,9 @@ from command_line import CommandLine
 
 import explorer
 from explorer.cli import INTERRUPTED
-from explorer.cli.output import figure
+from explorer.cli.commands.optimise import MOVED
 from explorer.cli.streams import Meter
+from explorer.find.requirement import PREFERENCES, RequiredLegs, RequiredLoad, Requirement
 from explorer.optimise.outcome import load_record
 
 COMMAND = ("optimise",)
@@ -184,100 +186,45 @@ def test_optimise_box_none_lifts_the_box(cli: CommandLine) -> None:
 
 
 def test_optimise_other_objectives_and_variables(cli: CommandLine) -> None:
-    required = ["--required-box", "8", "4", "6", "12", "8", "10"]
-    margin = cli.answer(
-        "--objective", "largest-margin", *required, "--free", "yaw", "--least", "0.5"
-    )
-    assert margin["objective"] == pytest.approx(6.0, abs=1e-6)
-    assert set(margin["values"]) == {"a3x", "a3y", "b1x", "b1y", "b2", "b3", "yaw"}
-    assert margin["design"]["required_box"] == [[8.0, 4.0, 6.0], [12.0, 8.0, 10.0]]
     smallest = cli.answer(
         *("--objective", "smallest-reach", "--starts", "2", "--least", "1"),
         *("--bounds", "b1x=-10:10", "b1y=-10:10", "b2=-10:10", "b3=-10:10", "a3y=1:40"),
     )
     assert smallest["objective"] == smallest["reach"] <= 17.90
     assert len(smallest["runs"]) == 2
-    largest = cli.answer("--objective", "largest-volume", "--target-reach", "15")
-    assert largest["reach"] <= 15.0 + 1e-6
-    stroke = cli.answer("--target-volume", "5000", "--stroke-ratio", "2")
-    low, high = stroke["design"]["limits"]["l1"]
-    assert (low, high) == (pytest.approx(stroke["reach"] / 2.0), None)
-
-
-def test_optimise_tells_and_writes_where_the_required_box_lies(
-    cli: CommandLine, tmp_path: Path
-) -> None:
-    out = tmp_path / "design.json"
-    argv = ["--objective", "largest-margin", "--required-box", "8", "4", "6", "12", "8", "10"]
-    argv += ["--free", "yaw", "shift-x", "shift-z", "--out", str(out)]
-    text = cli.text(*argv)
-    design, record = explorer.load_design(str(out)), load_record(out.with_suffix(".record.json"))
-    values = dict(
-        zip(record.problem.names, record.history[record.runs[0].best].values, strict=True)
+    largest = cli.answer(
+        *("--objective", "largest-volume", "--target-reach", "15"), *("--free", "yaw", "reach")
     )
-    shifts = [values["shift-x"], 0.0, values["shift-z"]]
-    assert design.required_box is not None
-    lows, highs = design.required_box
-    for axis, own, low, high, shift in zip(
-        "xyz", (8.0, 4.0, 6.0), lows, highs, shifts, strict=True
-    ):
-        assert (low, high) == pytest.approx((own + shift, own + shift + 4.0))
-        line = next(each for each in text.splitlines() if each.startswith(f"required box {axis}"))
-        assert line.split()[3:6:2] == [figure(own), figure(own + 4.0)]
-        assert line.split()[6:9:2] == [figure(low), figure(high)]
-    # Without a box the next search requires none.
-    again = cli.answer(
-        "--design", str(out), "--target-volume", "5000", "--iterations", "1", status=1
-    )
-    assert again["design"]["required_box"] is None
-
-
-LOADED = ["--force", "10", "--most", "150"]
-ON_PLANE = ["--required-box", "8", "3", "0", "12", "7", "8"]
-ACROSS = ["--required-box", "8", "3", "-5", "12", "7", "5"]
+    assert largest["longest_leg"] <= 15.0 + 1e-6
+    assert set(largest["values"]) == {"a3x", "a3y", "b1x", "b1y", "b2", "b3", "yaw", "reach"}
 
 
 @pytest.mark.parametrize(
-    ("argv", "box"),
+    ("argv", "words"),
     [
-        (["--objective", "smallest-load", "--target-volume", "5000"], ON_PLANE),
-        (["--objective", "largest-volume", "--held"], ACROSS),
+        (["--required-box", "8", "4", "6", "12", "8", "10"], "box_mm"),
+        (["--required_box=8"], "box_mm"),
+        (["--tilt", "5"], "tilt_deg"),
+        (["--held"], "payload"),
+        (["--error", "0.1"], "error_mm"),
+        (["--stroke-ratio", "2"], "ratio of legs"),
+        (["--objective", "largest-margin"], "margin_mm"),
+        (["--objective=smallest-load"], '"prefer": "little-force"'),
+        (["--free", "yaw", "shift-x"], "box_mm"),
+        (["--bounds", "shift-z=-3:6"], "box_mm"),
     ],
 )
-def test_optimise_refuses_a_box_where_no_load_is_held(
-    cli: CommandLine, monkeypatch: pytest.MonkeyPatch, argv: list[str], box: list[str]
+def test_words_about_a_box_are_refused_with_what_a_requirement_states(
+    cli: CommandLine, argv: list[str], words: str
 ) -> None:
-    def never(*_: object, **__: object) -> None:
-        pytest.fail("it searches")
-
-    monkeypatch.setattr("explorer.optimise.solver.optimise_design", never)
-    refused = cli.refusal(*LOADED, "--box", "none", *argv, *box, status=1)
-    assert "singular plane δ3 = 0, where no unique forces hold a load" in refused
-    found = cli.answer(*LOADED, "--box", "none", *argv, *box, status=1)
-    assert (found["objective"], found["holding"]) == (
-        None,
-        "margin" if box is ACROSS else "singular plane",
-    )
+    message = cli.refusal("--target-volume", "5000", *argv, status=2)
+    assert f"state {words}" in message
+    assert "explorer find NEED.json" in message
 
 
-def test_optimise_shows_infinite_loads_beside_finite_ones(
-    cli: CommandLine, tmp_path: Path, recwarn: pytest.WarningsRecorder
-) -> None:
-    design = explorer.PRESETS["paper-optimal"].with_limits(margin=None, box=None)
-    kept = tmp_path / "run.json"
-    argv = ["--design", design, *LOADED, *ACROSS]
-    margin = cli.answer(*argv, "--objective", "largest-margin", "--free", "yaw")
-    assert margin["objective"] == 0.0
-    load = ["--objective", "smallest-load", "--target-volume", "3000", "--free", "shift-z"]
-    text = cli.text(*argv, *load, "--record", kept)
-    share = next(line for line in text.splitlines() if line.startswith("load share over the box"))
-    start, end = share.split()[5:]
-    assert start == "infinite"
-    assert float(end) < 1.0
-    record = load_record(kept)
-    assert record.history[0].objective is None
-    # A search that ends where loads are infinite says so in valid JSON.
-    few = cli.answer(*argv, *load, "--bounds", "shift-z=-3:6", "--iterations", "1", status=1)
-    assert few["converged"] is False
-    assert few["objective"] is None or few["objective"] > 0.0
-    assert not recwarn.list
+def test_every_key_of_a_requirement_that_replaces_an_option_is_one() -> None:
+    known = {*Requirement.__struct_fields__, *RequiredLegs.__struct_fields__}
+    known |= {*RequiredLoad.__struct_fields__, *PREFERENCES}
+    for words in MOVED.values():
+        keys = {*re.findall(r"[a-z][a-z_-]+", words)} - {"and", "of", "or"}
+        assert keys <= known

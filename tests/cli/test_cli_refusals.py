@@ -100,7 +100,6 @@ optimise --target-volume 9 --free width | no variable 'width'
 optimise --target-volume 9 --box 1 2 3 0 4 5 | box x
 optimise --target-volume 9 --out /nowhere/design.json | there is no folder
 optimise --repeat /nowhere/run.json | cannot read
-optimise --objective largest-margin | needs a required box
 """
 """Command lines, each with words of the message."""
 

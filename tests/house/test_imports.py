@@ -31,7 +31,6 @@ ROOMS = (
     "statics",
     "workspace",
     "measures",
-    "proofs",
     "prototype",
     "paths",
     "optimise",

@@ -22,11 +22,9 @@ BOX = ((8.0, 3.0, 6.0), (12.0, 7.0, 10.0))
 LIMITED = OPTIMAL.with_limits(swing=Swing(*[30.0] * 6))
 PROBLEM = Problem(
     start=OPTIMAL,
-    objective="largest-margin",
+    objective="smallest-reach",
     variables=(Variable("b2", 1.0, 3.0), Variable("yaw", -90.0, 90.0)),
-    demands=Demands(
-        volume=7000.0, clearance=0.5, clearance_margin=1.0, required_box=BOX, least=0.5
-    ),
+    demands=Demands(volume=7000.0, clearance=0.5, clearance_margin=1.0, least=0.5),
 )
 STUDY = Study(
     name="of NumPy",

@@ -23,9 +23,8 @@ from explorer.measures.measure import Case
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.numerics.number_text import UNITS
-from explorer.optimise.defaults import make_problem, paper_start
+from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import compare_designs
-from explorer.optimise.problem import Problem
 from explorer.sweep.rows import evaluate
 from explorer.sweep.study import Study, decode_study, encode_study
 
@@ -34,26 +33,18 @@ pytestmark = pytest.mark.usefixtures("warm_kernels")
 Places = dict[str, dict[str, float | None]]
 
 SWIFT = [name for name, each in measures_in("studies").items() if each.cost == "low"]
-BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
-
-
-def problem() -> Problem:
-    """Return the paper's problem, with a required box."""
-    return make_problem(
-        paper_start(), "match-volume", volume=8000.0, clearance=0.2, required_box=BOX
-    )
 
 
 def found() -> Design:
-    """Return a design that solves it: of twice the reach of the start, on whose grid it is not."""
+    """Return an optimum of the paper's problem, of twice its start's reach and off its grid."""
     values = [19.056, 9.5175, 2.027, -4.7727, 5.5619, 4.7706]
     design = paper_start().with_variables(values)
-    return msgspec.structs.replace(design, name="found", required_box=BOX)
+    return msgspec.structs.replace(design, name="found")
 
 
 def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture[str]) -> Places:
     """Return the values that each place shows of a design, by place and label."""
-    paper = problem()
+    paper = paper_problem()
     before, after = compare_designs(paper, paper.start, design)
     compared = draw_compared(ComparedRequest(without_name(design))).measurements
     assert compared is not None
@@ -97,7 +88,7 @@ def test_measures_of_one_label_have_one_value(
 
 
 def test_demanded_clearance_of_an_optimised_design_counts_nearer_to_singular_planes() -> None:
-    paper = problem()
+    paper = paper_problem()
     _, after = compare_designs(paper, paper.start, found())
     demanded, own = after["demanded_clearance"], after["least_clearance"]
     assert demanded is not None
@@ -136,7 +127,7 @@ def test_compare_lists_a_new_measure() -> None:
 
 
 def test_optimiser_table_lists_a_new_measure() -> None:
-    _, after = compare_designs(problem(), DESIGN, DESIGN)
+    _, after = compare_designs(paper_problem(), DESIGN, DESIGN)
     assert after[NEW.name] == AREA
 
 

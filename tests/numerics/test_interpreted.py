@@ -14,7 +14,6 @@ from explorer.numerics.compiled import KERNELS, warm
 from explorer.singularity.nearest import nearest_singular_poses
 from explorer.statics.forces import actuator_forces
 from explorer.statics.load_cases import largest_shares, limit_values, load_case, settle_on_limit
-from explorer.statics.slopes import twist_slopes
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map, torsion_range
 from explorer.workspace.slices.column_volume import volume_of_columns
@@ -69,7 +68,6 @@ CASES: dict[str, Callable[[], FloatArray]] = {
     "motion": lambda: inverse_dynamics(
         OPTIMAL, positions(), ROTATION, np.arange(1.0, 7.0), np.arange(7.0, 1.0, -1.0)
     ),
-    "slopes": lambda: twist_slopes(FULL, positions(), ROTATION).by,
 }
 
 

@@ -37,7 +37,6 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 from explorer.statics.forces import worst_direction
 from explorer.statics.reactions import limit_shares
-from explorer.statics.slopes import PARAMETERS, twist_slopes
 
 OPTIMAL = PRESETS["paper-optimal"]
 LIMITED = msgspec.structs.replace(
@@ -282,28 +281,3 @@ def random_case(seed: int) -> tuple[Design, FloatArray, FloatArray]:
     rotation = Rotation.from_euler("zyx", random.uniform(-1.2, 1.2, 3)).as_matrix()
     positions = random.uniform((2.0, 2.0, 5.0), (12.0, 8.0, 12.0), (8, 3))
     return msgspec.structs.replace(design, tool=tool), positions, rotation
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_slopes_match_central_differences(seed: int) -> None:
-    design, positions, rotation = random_case(seed)
-    slopes = twist_slopes(design, positions, rotation)
-
-    def moved(index: int, step: float) -> tuple[FloatArray, FloatArray]:
-        variables, at, r = list(design.variables), positions.copy(), rotation
-        if index < len(variables):
-            variables[index] += step
-        elif PARAMETERS[index] == "yaw":
-            r = Rotation.from_rotvec([0.0, 0.0, step]).as_matrix() @ rotation
-        else:
-            at[:, "xyz".index(PARAMETERS[index])] += step
-        changed = design.with_variables(variables)
-        twists = twists_of_actuators(Configuration(changed, at, r, design.tool.position))
-        return twists, inverse(changed, at, r)[:, [2, 4]]
-
-    for index in range(len(PARAMETERS)):
-        ahead, behind = moved(index, STEP), moved(index, -STEP)
-        twists, struts = ((a - b) / (2.0 * STEP) for a, b in zip(ahead, behind, strict=True))
-        size = np.abs(slopes.twists).max() ** 2 + 1.0
-        assert_allclose(slopes.by[:, index], twists, rtol=1e-6, atol=1e-7 * size)
-        assert_allclose(slopes.struts_by[:, index], struts, rtol=1e-6, atol=1e-8)

@@ -27,7 +27,7 @@ from server_clock import wait_until_drawn
 
 from explorer.app.features.compare.feature import Pin
 from explorer.app.features.compare.state import CompareView
-from explorer.app.features.optimise.actions import SetRequest, StartRun
+from explorer.app.features.optimise.actions import StartRun
 from explorer.app.features.optimise.state import OptimisationRequest
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign
@@ -251,7 +251,7 @@ SCENES = {
         actions=(
             Open(paper_start()),
             bare(),
-            SetRequest(
+            Set(
                 "optimisation.request",
                 OptimisationRequest(volume=PAPER_VOLUME, clearance=CLEARANCE),
             ),

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 from limited_designs import limited, ordinary_case, troubled_case
 from long_cases import long_after
+from scipy.optimize import linprog
 
 from explorer import PRESETS, Design
 from explorer.legs.clearance import joined_pairs, leg_axes, leg_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Swing
+from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.clearance_bounds import LEGS_OF_PAIRS, bound_slacks, raise_bounds
+from explorer.workspace.clearance_bounds import (
+    LEGS_OF_PAIRS,
+    bound_slacks,
+    least_in_workspace,
+    raise_bounds,
+)
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import Cone, Constraint, slacks
 from explorer.workspace.workspace import Workspace
@@ -95,3 +105,43 @@ def test_least_clearances_are_certain_where_joints_bound_the_swing_of_legs() -> 
     swing = Swing(a1=30.0, b2=45.0, b3=35.0, b4=35.0)
     least = least_clearances(Workspace(limited(OPTIMAL, margin=0.5, swing=swing)))
     assert (least.clearance - least.bound <= 1e-4 * OPTIMAL.reach).all()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 4))
+def test_bound_by_duality_is_below_the_least_value_of_a_linear_programme(
+    seed: int, count: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    value, slope, half = rng.normal(), rng.normal(size=3), rng.uniform(0.1, 2.0, 3)
+    slack, slopes = rng.normal(size=count) + 0.5, rng.normal(size=(count, 3))
+    slopes[rng.random((count, 3)) < 0.2] = 0.0
+    x, y, z = slope.tolist()
+    bound = least_in_workspace(value, (x, y, z), half, slack, slopes)
+    assert bound >= value - np.abs(slope) @ half - 1e-12
+    # The slacks are not negative in the workspace.
+    limits: dict[str, Any] = {"A_ub": -slopes, "b_ub": slack} if count else {}
+    solve: Any = linprog
+    least = solve(slope, **limits, bounds=np.stack([-half, half], axis=-1))
+    if least.status == 0:
+        assert bound <= value + least.fun + 1e-9
+        if count <= 1:
+            assert bound == pytest.approx(value + least.fun, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", long_after(4, range(12)))
+def test_least_clearances_off_singular_planes_are_those_of_a_design_with_that_margin(
+    seed: int,
+) -> None:
+    design, rotation = ordinary_case(seed)
+    margin, tolerance, below = (share * design.reach for share in (0.05, 1e-3, 0.1))
+    free = Workspace(limited(design, margin=0.0), rotation)
+    found = least_clearances(free, tolerance, margin=margin)
+    demanded = least_clearances(Workspace(limited(design, margin=margin), rotation), tolerance)
+    assert found.clearance == pytest.approx(demanded.clearance, abs=tolerance)
+    near = least_clearances(free, tolerance, margin=margin, below=below)
+    is_near = np.isfinite(near.clearance)
+    assert (is_near == (demanded.clearance < below)).all()
+    assert near.clearance[is_near] == pytest.approx(demanded.clearance[is_near], abs=tolerance)
+    for position in (found.position, near.position[is_near]):
+        sizes = np.abs(margins(position, rotation))
+        assert (sizes >= margin * (1.0 - 1e-6)).all()

@@ -50,7 +50,7 @@ class Action(ABC):
         """Return the words for the action; "{design}" stands for the design's name after it."""
         if self.template:
             return self.template.format(action=self, design=DESIGN)
-        # "SetRequest" reads "Request".
+        # "SetObjective" reads "Objective".
         name = re.sub("(?<=.)([A-Z])", r" \1", type(self).__name__).lower()
         return name.removeprefix("set ").capitalize()
 

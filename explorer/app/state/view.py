@@ -136,7 +136,7 @@ class PrecisionView:
         ellipsoid: Whether the ellipsoid of the tool's RMS error is drawn.
         deflected: Whether the mechanism is drawn as the load deflects it.
         times: Magnification of the drawn deflection; None for one that suits it.
-        over: Positions of the budget: the present one, the required box, or the workspace.
+        over: Positions of the budget: the present one, the box of the design, or the workspace.
         wanted: Largest displacement of the tool that the tolerances may cause, in mm; None for a
             ranking of the tolerances as they are.
         wanted_turn: Largest turn of the tool likewise, in degrees; None for any.

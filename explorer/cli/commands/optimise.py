@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import msgspec
 
@@ -24,23 +24,41 @@ from explorer.mechanism.machine import Six
 from explorer.numerics.interruption import Interruption
 from explorer.optimise import conflicts, outcome as outcomes, solver
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.problem import Box, ObjectiveName, Problem, Variable, with_box
+from explorer.optimise.problem import ObjectiveName, Problem, Variable, with_box
+
+MOVED = {
+    "--required-box": "box_mm",
+    **dict.fromkeys(("shift-x", "shift-y", "shift-z"), "box_mm"),
+    "--tilt": "tilt_deg",
+    "--held": "payload, and push_n and pull_n of legs",
+    "--force": "force_n of payload",
+    "--most": "push_n and pull_n of legs",
+    "--stroke-ratio": "ratio of legs",
+    "--error": "error_mm",
+    "--deflection": "deflection_mm",
+    "--acceleration": "move_s",
+    "largest-margin": 'margin_mm, or "prefer": "far-from-singular"',
+    "smallest-load": '"prefer": "little-force"',
+    "smallest-error": '"prefer": "precise"',
+    "smallest-deflection": '"prefer": "stiff"',
+}
+"""Words that ask about a box of positions, with what a requirement file states instead."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OptimiseCommand(options.JsonOptions, options.DesignOptions):
-    """Optimise a design by SQP: match a volume, shorten the longest leg, or others.
+    """Optimise a design by SQP: match a volume, shorten the legs, or raise the volume.
 
     The gradients are exact, and the search starts from a given design, whose limits hold
     throughout. The search converges if all demands hold at a local optimum; otherwise the exit
     status is 1, and the output is the best iterate. Ctrl-C, or SIGTERM, ends it with the best so
-    far.
+    far. Machines for a box of positions are found by the command find.
     """
 
+    moved: ClassVar[Mapping[str, str]] = MOVED
+
     objective: ObjectiveName = "match-volume"
-    """Objective: F = |1 − V/V′| of the exact volume, the longest leg, the volume, or over the
-    required box the worst margin, the largest share of a limit of forces, the worst error, or the
-    largest deflection under the load."""
+    """Objective: F = |1 − V/V′| of the exact volume, the longest leg, or the volume."""
 
     target_volume: Annotated[values.PositiveVolume, values.OPTIONAL] = None
     """Volume to match, or least volume; for the shortest leg by default that of the design."""
@@ -59,46 +77,11 @@ class OptimiseCommand(options.JsonOptions, options.DesignOptions):
     clearance_margin: Annotated[values.Positive, values.hint("default: a 20th of the reach")] = None
     """Least margin of the poses at which the clearance is demanded: legs meet at singularities."""
 
-    stroke_ratio: Annotated[values.Positive, values.OPTIONAL] = None
-    """Largest ratio of longest to shortest length of an actuator."""
-
-    required_box: Annotated[values.Box, values.OPTIONAL] = None
-    """A box that must lie in the workspace, in design units."""
-
-    force: Annotated[values.Positive, values.OF_DESIGN] = None
-    """Force of any direction at the tool in N, besides the weight of the payload."""
-
-    most: Annotated[values.OfActuators, values.OF_DESIGN] = None
-    """Largest forces of the actuators in N, or one for all."""
-
-    most_bending: Annotated[values.Positive, values.OF_DESIGN] = None
-    """Largest bending moment of the struts in N m."""
-
-    held: values.Flag = False
-    """Demand that payload and force are held over the required box, within the limits of
-    actuators, struts and guide."""
-
-    error: Annotated[values.Positive, values.OPTIONAL] = None
-    """Worst displacement of the tool by the actuators' errors over the required box, in design
-    units."""
-
-    deflection: Annotated[values.Positive, values.OPTIONAL] = None
-    """Largest displacement of the tool under payload and force over the required box, in design
-    units."""
-
-    acceleration: Annotated[values.Positive, values.OPTIONAL] = None
-    """Acceleration from rest, in every direction over the required box, that the limits of forces
-    and moments allow with the payload, in m/s²."""
-
-    tilt: Annotated[values.Positive, values.OPTIONAL] = None
-    """Tilt in every azimuth that the required box must allow, in degrees."""
-
     least: Annotated[values.Positive, values.hint("default: a 20th of the largest variable")] = None
     """Smallest |a3y|, |b1y| and |b3 − b2|; a design with one of them zero is degenerate."""
 
-    free: Annotated[tuple[str, ...], values.texts("yaw|reach|shift-x|…"), values.OPTIONAL] = ()
-    """Further free variables: yaw, reach (one maximum of all lengths), and shift-x, shift-y,
-    shift-z of the required box."""
+    free: Annotated[tuple[str, ...], values.texts("yaw|reach"), values.OPTIONAL] = ()
+    """Further free variables: yaw, and reach, one maximum of all lengths."""
 
     bounds: Annotated[tuple[str, ...], values.texts("NAME=LOW:HIGH …"), values.OPTIONAL] = ()
     """Bounds of variables, such as b1x=-10:10 yaw=-90:-45."""
@@ -156,35 +139,22 @@ class OptimiseCommand(options.JsonOptions, options.DesignOptions):
             return record.problem, record.settings
         if self.objective == "match-volume" and self.target_volume is None:
             raise InputError("say which volume to match with --target-volume")
-        same = (
-            "clearance clearance_margin least stroke_ratio held error deflection acceleration tilt"
-        )
         problem = make_problem(
             self._start(),
             self.objective,
             volume=self.target_volume,
             reach=self.target_reach,
-            required_box=None if self.required_box is None else _as_box(self.required_box),
             bounds=[_as_variable(word) for word in self.bounds],
-            **output.attributes(self, f"{same} free"),
+            **output.attributes(self, "clearance clearance_margin least free"),
         )
         return problem, outcomes.Settings(**output.attributes(self, "starts seed iterations"))
 
     def _start(self) -> Design:
         """Return the design with the given limits; its home is fixed before its box changes."""
         design = self.read_design()
-        actuators = design.actuators
-        if self.most is not None:
-            actuators = msgspec.structs.replace(actuators, push_n=self.most, pull_n=None)
-        design = msgspec.structs.replace(
-            design,
-            payload=options.replace_given(design.payload, force_n=self.force),
-            actuators=actuators,
-            struts=options.replace_given(design.struts, moment_nm=self.most_bending),
-        )
         if self.box is None:
             return design
-        return with_box(design, _as_box(self.box) if self.box else None)
+        return with_box(design, (self.box[:3], self.box[3:]) if self.box else None)
 
     def _check_possible(self, problem: Problem) -> None:
         """Refuse a problem that the limits make infeasible, before kernels are compiled."""
@@ -216,16 +186,12 @@ def _search(
         steps[run] += 1
         share = (run + min(1.0, steps[run] / settings.iterations)) / starts
         text = f"start {run + 1} of {starts}, {iterate.phase} {steps[run]}: {symbol} "
-        text += f"{iterate.value:.6g}, volume {iterate.volume:.6g}"
+        text += f"{iterate.objective:.6g}, volume {iterate.volume:.6g}"
         meter.show(text + (f", missed: {iterate.worst}" if iterate.spare < 0.0 else ""), share)
 
     with Meter() as meter:
         given = msgspec.structs.asdict(settings)
         return solver.optimise_design(problem, watch=show, stop=stop, **given)
-
-
-def _as_box(six: Six) -> Box:
-    return six[:3], six[3:]
 
 
 def _as_variable(word: str) -> Variable:
@@ -302,10 +268,6 @@ def outcome_lines(outcome: outcomes.Outcome, written: Sequence[Path]) -> Iterato
         finite = [value for value in pair if value is not None and math.isfinite(value)]
         change = f"{finite[1] - finite[0]:+.6g}" if len(finite) == len(pair) else ""
         rows.append((name, *map(_cell, pair), change))
-    for name, *ends in outcomes.box_moves(problem, outcome.best.values):
-        (low, _), (found, _) = ends
-        cells = (" to ".join(map(output.figure, pair)) for pair in ends)
-        rows.append((name, *cells, f"{found - low:+.6g}"))
     if outcome.converged:
         yield from (outcome.message, "")
     yield output.table(rows, "<>>>")

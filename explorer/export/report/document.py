@@ -30,7 +30,6 @@ from explorer.optimise.outcome import (
     OBJECTIVE_SYMBOLS,
     Curve,
     Record,
-    box_moves,
     curves_of,
 )
 from explorer.optimise.problem import REACH, YAW
@@ -137,8 +136,7 @@ def search_section(data: ReportData) -> Iterator[Element]:
     if problem.demands.volume is not None:
         rows.append(("demanded volume, units³", problem.demands.volume))
     if best is not None:
-        value = "infinite" if best.objective is None else best.objective
-        rows.append((OBJECTIVE_SYMBOLS[problem.objective], value))
+        rows.append((OBJECTIVE_SYMBOLS[problem.objective], best.objective))
         rows.append(("volume, units³", best.volume))
     rows += [
         ("iterations", whole(run.iterations)),
@@ -157,9 +155,6 @@ def search_section(data: ReportData) -> Iterator[Element]:
         for name, old, new in zip(problem.names, problem.start_values, best.values, strict=True):
             if name in labels:
                 changes.append((labels[name], old, new, new - old))
-        for name, *ends in box_moves(problem, best.values):
-            for word, old, new in zip(("from", "to"), *ends, strict=True):
-                changes.append((f"{name} {word}", old, new, new - old))
     heads = ("units", "start", "optimum", "change")
     search = markup.table((), rows, "<>", "The search")
     yield element("div", search, markup.table(heads, changes, "<>>>", "The design"), class_="pair")

@@ -123,7 +123,7 @@ def _limits(data: ReportData) -> Element:
 
 
 def _required_box(data: ReportData) -> Iterator[Element]:
-    """Yield the box that a search required of the workspace, if one did."""
+    """Yield the required box of positions of the tool, if the design states one."""
     box, unit = data.design.required_box, data.design.unit_mm
     if box is None:
         return
@@ -131,8 +131,8 @@ def _required_box(data: ReportData) -> Iterator[Element]:
         (axis, low, high, low * unit, high * unit)
         for axis, low, high in zip("xyz", *box, strict=True)
     ]
-    heads = ("of b4", "from, units", "to, units", "from, mm", "to, mm")
-    yield markup.table(heads, rows, "<>>>>", "Box that a search required of the workspace")
+    heads = ("of the tool", "from, units", "to, units", "from, mm", "to, mm")
+    yield markup.table(heads, rows, "<>>>>", "Required box")
 
 
 def singularity_section(data: ReportData) -> Iterator[Element]:

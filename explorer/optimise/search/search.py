@@ -1,9 +1,9 @@
 """One run of the optimiser, from one start to an optimum or to a message that says why not.
 
 The solver's own verdict does not count: a volume must be matched, the conditions of an optimum
-must hold, and what is demanded of a whole box, of all tilts or of the whole workspace must be
-proven between the solver's poses too. Where it is not, the worst pose joins them, and the search
-goes on. A design is read from its file to the last bit.
+must hold, and the clearance must be proven between the solver's positions too. Where it is not,
+the worst position joins them, and the search goes on. A design is read from its file to the last
+bit.
 
 Clearances divide the designs into regions: on the border between two of them legs cross, which
 no solver that follows slopes passes. Where a region holds no solution, the search continues in
@@ -26,21 +26,21 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_apart, format_number
 from explorer.optimise.outcome import Iterate, Phase, Run, Status
-from explorer.optimise.problem import OVER_BOX, Problem
+from explorer.optimise.problem import Problem
+from explorer.optimise.search.clearance_demand import UnprovenClearance
 from explorer.optimise.search.demands import MET
 from explorer.optimise.search.model import Evaluation, SearchModel, reported_objective
 from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimality, solve
 from explorer.optimise.search.starts import open_workspace, promising_starts
 from explorer.optimise.search.state import SearchState, scales
-from explorer.proofs.proof import Proof
 from explorer.workspace.slices.volume import emptying_limits, unexplained_volume
 
 # Largest F = |1 − V/V′| of a matched volume.
 MATCHED = 1e-10
 # A workspace below this share of the demanded volume is opened first.
 OPEN = 0.01
-# Number of times that an attempt continues, with more poses at which demands are looked at or once
-# the volume is reached.
+# Number of times that an attempt continues, with more positions at which the clearance is demanded
+# or once the volume is reached.
 ROUNDS = 30
 # An objective that changes by no more than this share within so many steps has settled.
 STILL_STEPS, STILL = 4, 1e-9
@@ -148,8 +148,6 @@ class Search:
 
     def _is_closed(self, u: FloatArray) -> bool:
         """Whether the workspace must be opened first."""
-        if self.problem.objective in OVER_BOX and self.problem.demands.volume is None:
-            return False
         demanded = self.problem.demands.volume or self.problem.size**3
         return SearchState(self.problem, u).volume < OPEN * demanded
 
@@ -161,7 +159,8 @@ class Search:
         self.trail.see_opening(state, worst)
 
     def _solve(self, model: SearchModel) -> Attempt:
-        at, missed, has_grown, is_done = model.at(model.start), list[Proof](), False, False
+        at, has_grown, is_done = model.at(model.start), False, False
+        missed: list[UnprovenClearance] = []
         for _ in range(ROUNDS):
             before = self.steps
             at = self._feasible(model, self._sqp(model, at.u, "solving", self._may_end))
@@ -169,14 +168,13 @@ class Search:
             if is_done:
                 holding = optimality(model, at).holding
                 missed = model.look_at_unproven(at)
-                if not missed:
-                    missed = model.unproven_clearance(at)
-                    last = self.trail.last_at(at.state)
-                    if missed and self._is_outdone(last):
-                        return Attempt("outdone", holding, "", last)
+                last = self.trail.last_at(at.state)
+                if missed and model.is_relaxed and self._is_outdone(last):
+                    return Attempt("outdone", holding, "", last)
+                if model.is_relaxed or not missed:
                     break
                 at = model.at(at.u)
-                if all(proof.missed <= 0.0 for proof in missed):
+                if all(pair.missed <= 0.0 for pair in missed):
                     break
                 # Earlier iterates may miss what they were not asked for.
                 self.trail.begin()
@@ -215,7 +213,7 @@ class Search:
         if self.problem.objective == "match-volume":
             return self._is_kept(model, at)
         recent = self.trail.history[-STILL_STEPS:]
-        last = [each.objective for each in recent if each.objective is not None]
+        last = [each.objective for each in recent]
         if len(last) < STILL_STEPS or max(last) - min(last) > STILL * abs(last[-1]):
             return False
         near = nearest_feasible(model, at)
@@ -228,7 +226,6 @@ class Search:
     def _is_kept(self, model: SearchModel, at: Evaluation) -> bool:
         """Whether all demands are met."""
         most = MATCHED if self.problem.objective == "match-volume" else math.inf
-        # An infinite objective is no optimum.
         if not reported_objective(self.problem, at.state) < most or model.worst(at)[0] < 0.0:
             return False
         return at.state.volume > unexplained_volume(at.state.workspace).error
@@ -290,7 +287,12 @@ class Search:
         return last
 
     def _verdict(
-        self, model: SearchModel, at: Evaluation, missed: list[Proof], *, is_done: bool
+        self,
+        model: SearchModel,
+        at: Evaluation,
+        missed: list[UnprovenClearance],
+        *,
+        is_done: bool,
     ) -> Attempt:
         """Return the result of an attempt from its last place, and what it misses if it is done."""
         spare, worst = model.worst(at)
@@ -309,9 +311,9 @@ class Search:
         return Attempt("stalled", holding, "", best)
 
 
-def _missed_words(proof: Proof) -> str:
-    place = f"({', '.join(map(format_number, proof.position.tolist()))})"
-    if proof.missed > 0.0:
-        return f"not converged: {proof.name} is not kept everywhere, such as at {place}"
-    words = f"not converged: {proof.name} is kept wherever it was computed, but not proven"
-    return f"{words} at {place}" if np.isfinite(proof.position).all() else f"{words} everywhere"
+def _missed_words(pair: UnprovenClearance) -> str:
+    place = f"({', '.join(map(format_number, pair.position.tolist()))})"
+    if pair.missed > 0.0:
+        return f"not converged: {pair.name} is not kept everywhere, such as at {place}"
+    words = f"not converged: {pair.name} is kept wherever it was computed, but not proven"
+    return f"{words} at {place}" if np.isfinite(pair.position).all() else f"{words} everywhere"

@@ -19,7 +19,6 @@ Hanson, "Solving Least Squares Problems", 1974, chapter 23).
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -177,14 +176,13 @@ class Trail:
         self._add(state, "opening", worst, 0.0 if state.volume > 0.0 else -1.0)
 
     def _add(self, state: SearchState, phase: Phase, worst: str, spare: float) -> None:
-        objective = reported_objective(self.problem, state)
         iterate = Iterate(
             number=len(self.history),
             run=self.run,
             phase=phase,
             design=state.design,
             values=tuple(state.values.tolist()),
-            objective=objective if math.isfinite(objective) else None,
+            objective=reported_objective(self.problem, state),
             volume=state.volume,
             worst=worst,
             spare=spare,
@@ -205,8 +203,8 @@ class Trail:
         if problem.objective != "match-volume" and problem.demands.volume is not None:
             short = 1.0 - iterate.volume / problem.demands.volume
             missed = max(missed, short) if short > MET else missed
-        larger = problem.objective in ("largest-volume", "largest-margin")
-        return iterate.volume <= 0.0, missed, -iterate.value if larger else iterate.value
+        sign = -1.0 if problem.objective == "largest-volume" else 1.0
+        return iterate.volume <= 0.0, missed, sign * iterate.objective
 
 
 # A demand or bound with less than this to spare takes part.
@@ -270,7 +268,7 @@ def _conditions(model: SearchModel, at: Evaluation, around: list[Evaluation]) ->
             # An equality may pull either way.
             signs = (1.0, -1.0) if model.equalities[index] else (1.0,)
             active += [(name, s * place.gradients[index]) for place in around for s in signs]
-    ends = zip(model.problem.names, np.eye(len(at.u)), at.u, *model.bounds.T, strict=False)
+    ends = zip(model.problem.names, np.eye(len(at.u)), at.u, *model.bounds.T, strict=True)
     for variable, unit, here, low, high in ends:
         if here <= low + ACTIVE:
             active.append((f"lower bound of {variable}", unit))

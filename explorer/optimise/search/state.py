@@ -1,7 +1,7 @@
 """A problem at given variables: the design there, and the derivatives of all parameters.
 
 The solver works in scaled variables u of about unit size: lengths over the size of the
-start, the yaw in radians. An objective may append one more, see `explorer.optimise.search.model`.
+start, the yaw in radians.
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from explorer.measures.box import BoxStatics
 from explorer.mechanism.design import LENGTHS, Design
-from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import REACH, YAW, Box, Problem
+from explorer.optimise.problem import REACH, YAW, Problem
 from explorer.workspace.limits import constraints
 from explorer.workspace.slices.volume import unexplained_volume
 from explorer.workspace.workspace import Workspace
@@ -39,19 +37,11 @@ def bounds_of(problem: Problem) -> FloatArray:
     return pairs / scales(problem)[:, None]
 
 
-NOWHERE = np.zeros((0, 3))
-"""No places."""
-
-
 class SearchState:
-    """A problem at scaled variables (n,); each property is computed once.
+    """A problem at scaled variables (n,); each property is computed once."""
 
-    Loads, errors and deflections are evaluated at places in the required box too, as shares of its
-    edges, shape (k, 3).
-    """
-
-    def __init__(self, problem: Problem, u: FloatArray, places: FloatArray = NOWHERE) -> None:
-        self.problem, self.places, self.u = problem, places, u
+    def __init__(self, problem: Problem, u: FloatArray) -> None:
+        self.problem, self.u = problem, u
         self.values: FloatArray = u * scales(problem)
 
     @cached_property
@@ -68,21 +58,6 @@ class SearchState:
     def rotation(self) -> FloatArray:
         """The orientation of the workspace, shape (3, 3)."""
         return self.workspace.rotation
-
-    @cached_property
-    def yaw(self) -> float:
-        """The yaw of home, in degrees."""
-        return float(yaw_pitch_roll_from_rotation(self.rotation)[0])
-
-    @cached_property
-    def box(self) -> Box:
-        """The required box with its shift."""
-        return self.problem.required_box_at(self.values.tolist())
-
-    @cached_property
-    def statics(self) -> BoxStatics:
-        """Loads, errors and deflections over the required box."""
-        return BoxStatics(self.design, self.box, self.rotation, self.places)
 
     @cached_property
     def regions(self) -> dict[str, constraints.BallOrCylinder | constraints.HalfSpace]:
@@ -118,29 +93,17 @@ class SearchState:
                 chain.update({f"{length} maximum": unit for length in LENGTHS})
             else:
                 chain[name] = unit
-        ratio = problem.demands.stroke_ratio
-        if ratio is not None:
-            for length in LENGTHS:
-                low, high = self.design.length_range(length)
-                if low <= high / ratio:
-                    chain[f"{length} minimum"] = self._maximum_slope(length, chain) / ratio
         return chain
-
-    def _maximum_slope(self, length: str, chain: Chain) -> FloatArray:
-        """Return the derivatives of a maximum length, or of |a3|, by the scaled variables, (n,)."""
-        slope = np.zeros(len(self.u))
-        if getattr(self.design.limits, length)[1] is not None:
-            return chain.get(f"{length} maximum", slope)
-        for name, value in zip(("a3x", "a3y"), self.design.a3, strict=True):
-            if name in chain:
-                slope += value / self.design.reach * chain[name]
-        return slope
 
     @cached_property
     def longest_leg(self) -> tuple[float, FloatArray]:
         """The largest of the four maximum lengths, and its derivatives, shape (n,)."""
-        longest = max(LENGTHS, key=lambda name: self.design.length_range(name)[1])
-        return self.design.length_range(longest)[1], self._maximum_slope(longest, self.chain)
+        design = self.design
+        longest = max(LENGTHS, key=lambda name: design.length_range(name)[1])
+        if getattr(design.limits, longest)[1] is not None:
+            return design.length_range(longest)[1], self.along({f"{longest} maximum": 1.0})
+        (x, y), reach = design.a3, design.reach
+        return reach, self.along({"a3x": x / reach, "a3y": y / reach})
 
     def along(self, gradient: Mapping[str, float]) -> FloatArray:
         """Return derivatives by the scaled variables, shape (n,), from those by parameters."""

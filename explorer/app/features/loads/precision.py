@@ -8,7 +8,6 @@ from functools import lru_cache
 from explorer.app.features.feature import FileExport, Services, html_of, show_html
 from explorer.app.features.loads import budget as tasks
 from explorer.app.features.loads.load import Loads
-from explorer.app.features.optimise.work import requested_box
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
 from explorer.app.session.feed import FeedOf
@@ -29,12 +28,12 @@ from explorer.statics.compliance import is_elastic
 LOAD = "the load and the weights above"
 OVER: dict[str, PositionSet] = {
     "the present pose": "pose",
-    "the required box": "box",
+    "the box of the design": "box",
     "the workspace": "workspace",
 }
 OVER_HINT = (
-    "Positions at which the precision is wanted: the present one; the box of the tab Optimise, or "
-    "the workspace, at nodes of a grid in the orientation of home."
+    "Positions at which the precision is wanted: the present one; the box that bounds b4, or the "
+    "workspace, at nodes of a grid in the orientation of home."
 )
 
 
@@ -46,7 +45,7 @@ def budget_request(state: State) -> tasks.BudgetRequest:
         design,
         view.over,
         pose,
-        requested_box(state) if view.over == "box" else None,
+        design.limits.box,
         view.wanted,
         view.wanted_turn if view.wanted is not None else None,
         view.keep_actuators and view.wanted is not None,

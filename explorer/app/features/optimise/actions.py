@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import msgspec
-import numpy as np
 
-from explorer.app.features.optimise.state import PLACE, Optimisation, SearchResult, SearchRun
+from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, problem_of
 from explorer.app.state.actions import Action, Open, Set
 from explorer.app.state.geometry import with_machine
 from explorer.app.state.moves import move_to
-from explorer.app.state.parts import parts_kept_on_open, value_at, with_value
+from explorer.app.state.parts import parts_kept_on_open, with_value
 from explorer.app.state.state import State
 from explorer.errors import InputError, NoAnswerError
 from explorer.measures.catalogue import Measurements
@@ -26,28 +25,14 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.checks import LONGEST_NAME
 from explorer.optimise import conflicts, defaults
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import MAXIMA, SWING_LIMIT, YAW, with_box
+from explorer.optimise.problem import MAXIMA, SWING_LIMIT, with_box
 
 SUFFIX = "-optimised"
-BOX = "optimisation.request.box"
-LIMIT_NAMES = {SWING_LIMIT: "bounds of the swing", "margin": "least margin"}
+LIMIT_NAMES = {SWING_LIMIT: "bounds of the swing"}
 
 
 @dataclass(frozen=True)
-class SetRequest(Set):
-    """Change one value of the problem."""
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        request = Optimisation.of(super().apply(state)).request
-        if request.objective == "largest-margin" and not {YAW, PLACE} & {*request.free}:
-            # Only these influence the margins over a box.
-            request = replace(request, free=(*request.free, YAW, PLACE))
-        return with_value(state, "optimisation.request", request)
-
-
-@dataclass(frozen=True)
-class SetObjective(SetRequest):
+class SetObjective(Set):
     """Change the objective, and reset the volume."""
 
     def apply(self, state: State) -> State:
@@ -168,10 +153,7 @@ class AddIterates(Action):
 
 @dataclass(frozen=True)
 class EndRun(Action):
-    """End a run and show its result, or without one the user's own design.
-
-    The required box is requested where the search found it.
-    """
+    """End a run and show its result, or without one the user's own design."""
 
     template: ClassVar[str] = "Optimise: {design}"
 
@@ -189,10 +171,7 @@ class EndRun(Action):
         after = with_value(state, "optimisation.run", ended)
         if self.verdict.best is None:
             return _restore_own(after, run.own)
-        best = self.verdict.best.design
-        if best.required_box is not None:
-            after = with_value(after, BOX, best.required_box)
-        return _with_design(after, _rename(best))
+        return _with_design(after, _rename(self.verdict.best.design))
 
 
 @dataclass(frozen=True)
@@ -226,20 +205,16 @@ class Accept(Action):
 
 @dataclass(frozen=True)
 class Revert(Action):
-    """Return to the user's own design in its pose, exactly, and to its required box."""
+    """Return to the user's own design in its pose, exactly."""
 
     template: ClassVar[str] = "Revert to {design}"
 
     def apply(self, state: State) -> State:
         """Return the next state."""
         run = Optimisation.of(state).undecided
-        if run is None or run.best is None:
+        if run is None:
             return state
-        after = _restore_own(with_value(state, "optimisation.run", None), run.own)
-        requested, found = value_at(after, BOX), run.best.design.required_box
-        # What has changed its unit and back may be off by rounding.
-        is_found = requested and found and np.allclose(requested, found, rtol=1e-9)
-        return with_value(after, BOX, value_at(run.own, BOX)) if is_found else after
+        return _restore_own(with_value(state, "optimisation.run", None), run.own)
 
 
 def _running(state: State, number: int) -> SearchRun | None:

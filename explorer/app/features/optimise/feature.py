@@ -14,45 +14,38 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
-from explorer.app.features.optimise.actions import SetObjective, SetRequest
+from explorer.app.features.optimise.actions import SetObjective
 from explorer.app.features.optimise.buttons import ACCEPT, add_buttons, button
 from explorer.app.features.optimise.runner import Optimiser
-from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest, SearchRun
+from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchRun
 from explorer.app.features.optimise.words import goal_unit, result_words, search_notice
-from explorer.app.features.optimise.work import complete_request, requested_box
+from explorer.app.features.optimise.work import complete_request
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
-from explorer.app.state.actions import Action
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets import charts
 from explorer.app.widgets.buttons import activity
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
-from explorer.mechanism.pose import Triple
 from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
-from explorer.optimise.problem import OVER_BOX, YAW, ObjectiveName, Problem
+from explorer.optimise.problem import YAW, ObjectiveName, Problem
 from explorer.page.widgets.assigning import Update
-from explorer.statics.compliance import is_elastic
 
 OBJECTIVES: dict[str, ObjectiveName] = {
     "match a volume": "match-volume",
     "shortest legs for a volume": "smallest-reach",
     "largest volume for a leg length": "largest-volume",
-    "largest worst margin over a box": "largest-margin",
-    "smallest load over a box": "smallest-load",
-    "smallest error over a box": "smallest-error",
-    "smallest deflection over a box": "smallest-deflection",
 }
 FREE = {
     **{name: f"Let {name} change." for name in VARIABLES},
     YAW: "Let the yaw of home change, and with it the orientation of the workspace.",
-    PLACE: "Let the required box move without changing its size.",
 }
-FREE_LABELS = {YAW: "yaw of home", PLACE: "place of the box"}
+FREE_LABELS = {YAW: "yaw of home"}
 STEP = 0.001
 COLUMNS = '<div class="ex-columns"></div>'
 """Markup that makes the stylesheet put what follows it in a tab side by side."""
@@ -105,7 +98,7 @@ class OptimisePanel:
             "reach",
             "longest_leg",
             "The largest maximum length of l1, d2, d4 and l4 allowed.",
-            visible=lambda state: _request(state).needs_reach,
+            visible=lambda state: not _request(state).needs_volume,
         )
         self._add_number(
             "clearance",
@@ -117,57 +110,10 @@ class OptimisePanel:
         controls.number(
             "Starts",
             "Number of designs to start from: the present one, and others spread over the bounds.",
-            At("optimisation.request.starts", convert=round, action=SetRequest),
+            At("optimisation.request.starts", convert=round),
             least=1,
             step=1,
         )
-        controls.checkbox(
-            "Required box",
-            "Demand that a box lies within the workspace; it is drawn.",
-            ControlBinding(
-                lambda frame: _request(frame.state).needs_box,
-                lambda _, on: SetRequest("optimisation.request.with_box", on, "Required box"),
-            ),
-            disabled=lambda state: _request(state).objective in OVER_BOX,
-        )
-        controls.checkbox(
-            "Hold the load",
-            "Demand that the payload's weight and force are held within the limits of actuators, "
-            "struts and guide, wherever in the required box.",
-            At("optimisation.request.held", action=SetRequest),
-        )
-        self._add_number(
-            "error",
-            "worst_error",
-            "The worst displacement of the tool by the actuators' errors allowed in the required "
-            "box; 0 for no demand.",
-            # A demand that another design left behind can be taken back.
-            visible=lambda state: any(state.design.actuators.error_mm) or _request(state).error > 0,
-        )
-        self._add_number(
-            "deflection",
-            "deflection",
-            "The largest displacement of the tool under the payload's weight and force allowed in "
-            "the required box; 0 for no demand.",
-            visible=lambda state: is_elastic(state.design) or _request(state).deflection > 0,
-        )
-        self._add_number(
-            "acceleration",
-            "acceleration",
-            "The acceleration from rest, in every direction, that the limits of forces and moments "
-            "must allow with the payload in the required box, in m/s²; 0 for no demand.",
-            step=0.1,
-            visible=lambda s: max(s.design.payload.mass_kg, _request(s).acceleration) > 0.0,
-        )
-        self._add_number(
-            "tilt",
-            "box_tilt",
-            "The tilt from the orientation of home that every position of the required box must "
-            "allow in every azimuth, in degrees; 0 for no demand.",
-            step=1.0,
-        )
-        for end, word in enumerate(("from", "to")):
-            self._add_corner(end, f"Box {word} ({{unit}})")
 
     def _add_number(
         self,
@@ -175,46 +121,27 @@ class OptimisePanel:
         measure: str,
         hint: str,
         *,
-        step: float = STEP,
         visible: Callable[[State], bool] | None = None,
     ) -> None:
         """Add a demand, with the label of the measure that it bounds."""
         at = At(
             f"optimisation.request.{field}",
             default=lambda state: getattr(complete_request(state), field),
-            action=SetRequest,
         )
-        power, unit = CATALOGUE[measure].power, CATALOGUE[measure].unit
-        label = f"{CATALOGUE[measure].label.capitalize()} ({'{unit}' if power else unit})"
-        self._controls.number(label, hint, at, least=0.0, step=step, power=power, visible=visible)
-
-    def _add_corner(self, end: int, label: str) -> None:
-        def write(state: State, value: Triple) -> Action:
-            lows, highs = requested_box(state)
-            box = (value, highs) if end == 0 else (lows, value)
-            return SetRequest("optimisation.request.box", box, "Required box")
-
-        self._controls.triple(
-            label,
-            "A corner of the box, in the base frame.",
-            ControlBinding(lambda frame: requested_box(frame.state)[end], write),
-            step=STEP,
-            power=1,
-            visible=lambda state: _request(state).needs_box,
-        )
+        label, power = CATALOGUE[measure].label.capitalize() + " ({unit})", CATALOGUE[measure].power
+        self._controls.number(label, hint, at, least=0.0, step=STEP, power=power, visible=visible)
 
     def _add_free(self, name: str, hint: str) -> None:
         def write(state: State, on: bool) -> Action:
             free = _request(state).free
             chosen = tuple(key for key in FREE if (on if key == name else key in free))
             label = f"Free variable {FREE_LABELS.get(name, name)}"
-            return SetRequest("optimisation.request.free", chosen, label, "on" if on else "off")
+            return Set("optimisation.request.free", chosen, label, "on" if on else "off")
 
         self._controls.checkbox(
             FREE_LABELS.get(name, name),
             hint,
             ControlBinding(lambda frame: name in _request(frame.state).free, write),
-            disabled=lambda state: name == PLACE and not _request(state).needs_box,
         )
 
 
@@ -282,10 +209,10 @@ def _name(problem: Problem, last: Iterate, curve: Curve, unit: Unit) -> str:
         target = "" if curve.level is None else f", required {format_number(curve.level, 6)}"
         return f"Volume: {unit.text(last.volume, 6)}{target}"
     if curve.powers:
-        value = format_number(last.value, 2, size=1.0)
+        value = format_number(last.objective, 2, size=1.0)
         return f"log10 of F = |1 − V / V′|; F = {value}"
     name = OBJECTIVE_SYMBOLS[problem.objective].capitalize()
-    return f"{name}: {unit.text(last.value, 6)}"
+    return f"{name}: {unit.text(last.objective, 6)}"
 
 
 def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:

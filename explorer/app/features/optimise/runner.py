@@ -181,6 +181,6 @@ def result_of(run: SearchRun, ending: Outcome | str, iterates: tuple[Iterate, ..
     if not iterates:
         return SearchResult("cancelled", "cancelled before the first iterate")
     found = min(iterates, key=Trail(run.problem).rank)
-    value = f"{OBJECTIVE_SYMBOLS[run.problem.objective]} = {format_number(found.value, 6)}"
+    value = f"{OBJECTIVE_SYMBOLS[run.problem.objective]} = {format_number(found.objective, 6)}"
     message = f"cancelled: {value} is the best of {len(iterates)} iterates"
     return SearchResult("cancelled", message, found, starts=iterates[-1].run + 1)

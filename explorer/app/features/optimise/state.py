@@ -6,9 +6,8 @@ exactly. The user fills in an `OptimisationRequest`; a `Problem` is made of it w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import msgspec
 
@@ -23,9 +22,6 @@ from explorer.optimise.search.starts import check_starts
 
 Count = Annotated[int, msgspec.Meta(ge=0)]
 
-PLACE = "place"
-"""Name in `OptimisationRequest.free` for the three shifts of the required box."""
-
 
 @dataclass(frozen=True)
 class OptimisationRequest:
@@ -34,10 +30,8 @@ class OptimisationRequest:
     Attributes:
         volume: Volume to match, or the least one; None for one that suits the design.
         reach: Largest reach; None for that of the design.
-        free: Names of what may change, out of `VARIABLES`, `YAW` and `PLACE`.
-        with_box: Whether a box must lie within the workspace, whatever the objective.
-        box: The required box; None for one that suits the design.
-        clearance, held, error, deflection, acceleration, tilt: As in `Demands`; 0 for no demand.
+        clearance: As in `Demands`; 0 for no demand.
+        free: Names of what may change, out of `VARIABLES` and `YAW`.
 
     Raises:
         InputError: A volume or reach that is not positive, a clearance below zero, too few or too
@@ -50,42 +44,18 @@ class OptimisationRequest:
     clearance: float = field(default=0.0, metadata=LENGTHS)
     free: tuple[str, ...] = VARIABLES
     starts: int = 1
-    with_box: bool = False
-    box: problems.Box | None = field(default=None, metadata=LENGTHS)
-    held: bool = False
-    error: float = field(default=0.0, metadata=LENGTHS)
-    deflection: float = field(default=0.0, metadata=LENGTHS)
-    acceleration: float = 0.0
-    tilt: float = 0.0
 
     def __post_init__(self) -> None:
-        unknown = {*self.free} - {*VARIABLES, problems.YAW, PLACE}
+        unknown = {*self.free} - {*VARIABLES, problems.YAW}
         if unknown:
             raise InputError(f"nothing named {min(unknown)!r} can be free in an optimisation")
         check_starts(self.starts)
-        problems.Demands(volume=self.volume, reach=self.reach, **self.demanded)
-
-    @property
-    def demanded(self) -> Mapping[str, Any]:
-        """The demands that are numbers but 0 for none, by name; None for none."""
-        names = "clearance", "error", "deflection", "acceleration", "tilt"
-        return {name: getattr(self, name) or None for name in names}
+        problems.Demands(volume=self.volume, reach=self.reach, clearance=self.clearance or None)
 
     @property
     def needs_volume(self) -> bool:
-        """Whether the objective takes a volume, by default the present one."""
-        return self.objective in ("match-volume", "smallest-reach", *problems.OF_THE_MACHINE)
-
-    @property
-    def needs_reach(self) -> bool:
-        """Whether the objective takes a reach."""
-        return self.objective in ("largest-volume", *problems.OF_THE_MACHINE)
-
-    @property
-    def needs_box(self) -> bool:
-        """Whether a box is required."""
-        demands = self.held, self.error, self.deflection, self.acceleration, self.tilt
-        return self.with_box or any(demands) or self.objective in problems.OVER_BOX
+        """Whether the objective takes a volume, by default the present one, rather than a reach."""
+        return self.objective != "largest-volume"
 
 
 REACHED = "{objective}"

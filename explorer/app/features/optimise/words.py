@@ -16,11 +16,11 @@ from explorer.app.widgets import markup
 from explorer.measures.blocks.block import Look
 from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.measure import CERTAIN
-from explorer.mechanism.design import VARIABLES, Design, Pair
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise import problem as problems
 from explorer.optimise.conflicts import Conflict
-from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Iterate, box_moves
+from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Iterate
 from explorer.workspace.limits.quantities import DIGITS as LIMIT_DIGITS
 from explorer.workspace.limits.table import limits_in_force
 
@@ -31,14 +31,8 @@ TITLES = {
     "stalled": "Stalled",
     "cancelled": "Cancelled: the best so far",
 }
-# Missing inputs of a design, by the limits of refusals, and where to enter them.
-LACKING = {
-    problems.NO_LOAD: "payload and limits in the tab Machine",
-    problems.NO_ERRORS: "the errors of the actuators in the tab Machine",
-    problems.RIGID: "the stiffness of the actuators or the tubes of the struts in the tab Machine",
-}
 # Limits of refusals without a problem that could be searched.
-NO_PROBLEM = ("", problems.SWING_LIMIT, problems.MAXIMA, *LACKING)
+NO_PROBLEM = ("", problems.SWING_LIMIT, problems.MAXIMA)
 
 
 @dataclass(frozen=True)
@@ -89,10 +83,7 @@ def _reached_text(problem: problems.Problem, iterate: Iterate, state: State) -> 
     unit = goal_unit(problem.objective, state)
     if problem.objective == "match-volume":
         return f"volume {unit.text(iterate.volume, 5)}"
-    name = OBJECTIVE_SYMBOLS[problem.objective]
-    if iterate.objective is None:
-        return f"{name} infinite"
-    return f"{name} {unit.text(iterate.objective, 6)}"
+    return f"{OBJECTIVE_SYMBOLS[problem.objective]} {unit.text(iterate.objective, 6)}"
 
 
 def goal_unit(objective: problems.ObjectiveName, state: State) -> Unit:
@@ -163,8 +154,7 @@ def result_words(state: State, built: str = "") -> str:
 def refused_words(body: str, refusals: Sequence[Conflict], limits: Sequence[str]) -> str:
     """Return why no search can start, as HTML; buttons below offer to lift some limits."""
     if any(refusal.limit not in limits for refusal in refusals):
-        lacking = next((refusal.limit for refusal in refusals if refusal.limit in LACKING), "")
-        body += f" Change the demands, or {LACKING.get(lacking, 'the limits in the tab Design')}."
+        body += " Change the demands, or the limits in the tab Design."
     is_problem = not any(refusal.limit in NO_PROBLEM for refusal in refusals)
     title = "No design can keep these demands" if is_problem else "This cannot be optimised"
     return markup.alert(title, body)
@@ -216,9 +206,6 @@ def comparison_table(run: SearchRun, view: View) -> str:
         for name in run.comparison[1].values
         if name != problems.YAW or problems.YAW in run.problem.names
     ]
-    if run.best is not None:
-        moves = box_moves(run.problem, run.best.values)
-        rows += [_box_row(*move, columns[-1].unit) for move in moves]
     head = "".join(f'<td class="ex-number">{each}</td>' for each in ("", "old", "new", "change"))
     return f'<table class="ex-compare"><tr class="ex-dim">{head}</tr>{"".join(rows)}</table>'
 
@@ -238,16 +225,6 @@ def _comparison_row(problem: problems.Problem, name: str, columns: Sequence[Comp
     look = "ex-first" if name == VARIABLES[0] else look
     change = _look_of_change(problem, name, *(column.value(measure) for column in columns))
     return measure_row(measure, columns, label=label, hint=hint, look=look, change=change)
-
-
-def _box_row(name: str, before: Pair, after: Pair, unit: Unit) -> str:
-    """Return the row of an axis of the required box: where it began, and where it was found."""
-    way = unit.number(after[0] - before[0], 5, size=after[1])
-    texts = (unit.number(before[0], 5), unit.number(after[0], 5), f"{'+' * (after > before)}{way}")
-    cells = "".join(f'<td class="ex-number">{text}</td>' for text in texts)
-    hint = "Lower end of the required box, which the search may move; its edges keep their lengths."
-    label = f'{name} from <span class="ex-dim ex-small">{unit.name}</span>'
-    return f'<tr title="{hint}"><td>{label}</td>{cells}</tr>'
 
 
 def _look_of_change(

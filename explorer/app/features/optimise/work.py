@@ -7,30 +7,23 @@ from dataclasses import replace
 from functools import lru_cache
 
 import msgspec
-import numpy as np
 
-from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest
+from explorer.app.features.optimise.state import Optimisation, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.jobs.process import Channel
 from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import Design
-from explorer.numerics import checks
 from explorer.numerics.number_text import Unit
 from explorer.optimise import conflicts, defaults, problem as problems, solver
 from explorer.optimise.outcome import Outcome
 from explorer.workspace.slices.volume import workspace_volume
-from explorer.workspace.workspace import Workspace
 
 PAPER_REQUEST = OptimisationRequest(volume=defaults.PAPER_VOLUME, clearance=defaults.CLEARANCE)
 """The request of the paper's problem."""
 
 # Default volume to match, as a multiple of the present volume.
 MORE = 1.1
-# Edge of the default box, as a share of that of the largest box about home in the workspace.
-SHARE_OF_BOX = 0.5
-# Number of positions checked on each edge of a box, and of halvings of the edge.
-TRIED, HALVINGS = 5, 30
 
 
 def complete_request(state: State) -> OptimisationRequest:
@@ -44,13 +37,7 @@ def _complete(request: OptimisationRequest, base: Design) -> OptimisationRequest
         request,
         volume=request.volume or _default_volume(base, request.objective),
         reach=request.reach or longest_leg(base),
-        box=request.box or default_box(base),
     )
-
-
-def requested_box(state: State) -> problems.Box:
-    """Return the required box."""
-    return Optimisation.of(state).request.box or default_box(state.base)
 
 
 def problem_of(state: State) -> problems.Problem:
@@ -63,20 +50,15 @@ def problem_of(state: State) -> problems.Problem:
 
 
 def _problem(design: Design, request: OptimisationRequest) -> problems.Problem:
-    free = [name for name in request.free if name != PLACE]
-    if request.needs_box and PLACE in request.free:
-        free += problems.SHIFTS
     problem = defaults.make_problem(
         design,
         request.objective,
         volume=request.volume if request.needs_volume else None,
-        reach=request.reach if request.needs_reach else None,
-        required_box=request.box if request.needs_box else None,
-        held=request.held,
-        **request.demanded,
-        free=free,
+        reach=None if request.needs_volume else request.reach,
+        clearance=request.clearance or None,
+        free=request.free,
     )
-    variables = tuple(variable for variable in problem.variables if variable.name in free)
+    variables = tuple(each for each in problem.variables if each.name in request.free)
     return msgspec.structs.replace(problem, variables=variables)
 
 
@@ -114,29 +96,6 @@ def is_paper_box_on_offer(state: State) -> bool:
     boxed = problems.with_box(state.design, conflicts.PAPER_BOX)
     left = _find_refusals(boxed, complete_request(state), state.unit)
     return boxed != state.design and all(each.limit != conflicts.BOX_LIMIT for each in left)
-
-
-def default_box(design: Design) -> problems.Box:
-    """Return the box that a search has required of a design, or one within its workspace."""
-    return design.required_box or box_within(design)
-
-
-@lru_cache(maxsize=8)
-def box_within(design: Design) -> problems.Box:
-    """Return a box in the workspace about the home position; a small one if home is outside."""
-    home = design.home_pose
-    workspace, middle = Workspace(design), np.array(home.position)
-    grid = np.indices((TRIED,) * 3).reshape(3, -1).T / (TRIED - 1.0) - 0.5
-    low, high = 0.0, 2.0 * design.reach
-    for _ in range(HALVINGS):
-        half = 0.5 * (low + high)
-        is_within = workspace.contains(middle + half * grid).all()
-        low, high = (half, high) if is_within else (low, half)
-    edge = SHARE_OF_BOX * low or 0.1 * design.reach
-    # Round numbers read better, and the box need not be exact.
-    digits = max(0, 1 - math.floor(math.log10(edge)))
-    ends = np.round([middle - 0.5 * edge, middle + 0.5 * edge], digits)
-    return checks.box("the required box", ends)
 
 
 @lru_cache(maxsize=8)
