@@ -188,8 +188,8 @@ class Improvement:
         none = np.zeros((1, 5 + len(self.extra)))
         with np.errstate(all="ignore"):
             table = self.table(x[None], poses, none)[0].min(axis=1)
+            preferred = self._preferred(self.terms.values(x[None], poses), none.T[5:, :, None])
         lengths = [-float(table[4 + leg]) for leg in range(4)]
-        preferred = self._preferred(self.terms.values(x[None], poses), none.T[5:, :, None])
         worst = [-float(np.min(each)) for each in preferred]
         return np.array([*table[:4], max(lengths), *self._group(worst)])
 
@@ -265,7 +265,7 @@ class Improvement:
         near = np.full(len(y), math.inf)
         near[:n] = trusted
         lows, highs = _ranges(self, self.start)
-        ends = np.column_stack([np.maximum(lows, y - near), np.minimum(highs, y + near)])
+        ends = np.column_stack([np.clip(each, lows, highs) for each in (y - near, y + near)])
         equal = np.zeros(len(rows), dtype=bool)
         with np.errstate(all="ignore"), one_thread():
             found = slsqp(evaluate, _ignore, y, ends, equal, most=STEPS, precision=PRECISION)
