@@ -10,6 +10,12 @@ from .errors import (
     MissingExtraError as MissingExtraError,
     NoAnswerError as NoAnswerError,
 )
+from .find.check import check_requirement as check_requirement
+from .find.find import find_designs as find_designs
+from .find.requirement import (
+    Requirement as Requirement,
+    load_requirement as load_requirement,
+)
 from .legs.clearance import leg_clearances as leg_clearances
 from .legs.interference import tetrahedra_overlap as tetrahedra_overlap
 from .measures.snapshot import Snapshot as Snapshot, evaluate as evaluate

@@ -32,6 +32,8 @@ COMMANDS: Mapping[str, str] = {
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
     "orientation": "Measure the orientations of a position: share of all, greatest tilts, torsion.",
     "reproduce": "Measure the claims of the paper again, and judge each.",
+    "check": "Check a design against a requirement: each demand, its worst value and pose.",
+    "find": "Find designs that keep a requirement, each of another kind, the preferred one first.",
     "optimise": "Optimise a design by SQP: match a volume, shorten the legs, or raise the volume.",
     "sweep": "Measure the designs of a study, on every core or a cluster; list the Pareto front.",
     "export": "Write workspace, parts, models, pages, a figure or code for controllers as files.",

@@ -28,6 +28,7 @@ _MODULES = {
     **dict.fromkeys(("inverse", "forward", "singularity"), "kinematics"),
     **dict.fromkeys(("forces", "accuracy", "budget"), "statics"),
     **dict.fromkeys(("path", "drives"), "paths"),
+    **dict.fromkeys(("check", "find"), "requirement"),
     "orientation": "workspace",
     **dict.fromkeys(("serve", "report", "screenshot"), "page"),
 }
@@ -70,7 +71,7 @@ def condense(message: str) -> str:
     body = [line.strip() for line in sections[min(len(sections) - 1, 1)].splitlines()]
     text = " ".join(filter(None, body))
     if text.startswith("Missing from"):
-        options = [words.split()[0] for words in body if words.startswith("--")]
+        options = [words.split()[0] for words in body if words.startswith("--") or words.isupper()]
         return f"missing {', '.join(options)}" if options else "an option is missing"
     without_value = re.match(r"Missing value for argument '(--[a-z0-9-]+)'", text)
     if without_value:
