@@ -39,7 +39,7 @@ UNITS_PER_SECOND = 250.0
 # Units of a block of candidates, of one evaluation of a machine, and of a certificate.
 BLOCK_UNITS, EVALUATION_UNITS, CERTIFICATE_UNITS = 50.0, 1.0, 20.0
 # Seconds of a search for a relaxed requirement.
-RELAXED_SECONDS = 2.0
+RELAXED_SECONDS = 3.0
 # Factor on the seconds after which a search ends on a slow machine all the same.
 PATIENCE = 4.0
 # Rounds of an improvement and a certificate, and cells of poses of the latter.
@@ -129,6 +129,9 @@ class Search:
         """Yield kinds and machines to improve, without an end."""
         random = np.random.default_rng(self.seed + 1)
         if start is not None:
+            as_it_is = self._as_it_is(start)
+            if as_it_is is not None:
+                yield as_it_is
             for kind in self.kinds:
                 yield start, kind
             while True:
@@ -137,17 +140,10 @@ class Search:
         for x, missed, large in candidates(self.terms, self.seed):
             self.spend(BLOCK_UNITS)
             if first and len(x):
-                for row in np.argsort(missed)[:TRIED]:
-                    self.spend(CERTIFICATE_UNITS)
-                    certificate = certify(x[row], self.terms, cells=CELLS)
-                    parts = self.terms.parts
-                    if certificate.is_kept and (
-                        parts is None or fits(x[row], self.terms, certificate)
-                    ):
-                        poses = standard_poses(self.terms.tilt)
-                        cost = Improvement(self.terms, self.kinds[0], x[row]).cost(poses)
-                        yield Machine(x[row], certificate, cost, self.kinds[0], poses)
-                        break
+                tried = map(self._as_it_is, x[np.argsort(missed)[:TRIED]])
+                kept = next((each for each in tried if each is not None), None)
+                if kept is not None:
+                    yield kept
             score = np.log(large) + 4.0 * np.maximum(missed, 0.0)
             order = np.argsort(score)[: IMPROVED if first else IMPROVED // 2]
             for row in order:
@@ -162,6 +158,17 @@ class Search:
             if self.kinds[0] in self.best:
                 for _ in SHAKES:
                     yield self._shake(self.best[self.kinds[0]].x, random), self.kinds[0]
+
+    def _as_it_is(self, x: FloatArray) -> Machine | None:
+        """Return a machine with its certificate, of the preferred kind; None if it fails."""
+        self.spend(CERTIFICATE_UNITS)
+        certificate = certify(x, self.terms, cells=CELLS)
+        is_kept = certificate.is_kept
+        if not is_kept or (self.terms.parts and not fits(x, self.terms, certificate)):
+            return None
+        poses, kind = standard_poses(self.terms.tilt), self.kinds[0]
+        cost = Improvement(self.terms, kind, x).cost(poses)
+        return Machine(x, certificate, cost, kind, poses)
 
     def _shake(self, x: FloatArray, random: np.random.Generator) -> FloatArray:
         """Return a machine near another one."""
@@ -288,18 +295,22 @@ def _nearest(
     for name in relaxable_fields(requirement):
         last: list[FloatArray] = []
 
-        def keeps(relaxed: Requirement, last: list[FloatArray] = last) -> bool:
-            units = UNITS_PER_SECOND * min(seconds, RELAXED_SECONDS)
-            ends = time.perf_counter() + PATIENCE * min(seconds, RELAXED_SECONDS)
-            search = Search(
-                Terms.of(relaxed), ("small",), units, ends, stop, seed, is_first_enough=True
-            )
+        def keeps(relaxed: Requirement, is_thorough: bool, last: list[FloatArray] = last) -> float:
             if impossible_demands(relaxed):
-                return False
+                return math.inf
+            allowed = min(seconds, RELAXED_SECONDS) * (3.0 if is_thorough else 1.0)
+            units = UNITS_PER_SECOND * allowed
+            ends, is_first = time.perf_counter() + PATIENCE * allowed, not is_thorough
+            search = Search(
+                Terms.of(relaxed), ("small",), units, ends, stop, seed, is_first_enough=is_first
+            )
             search.run(last[-1] if last else None, lambda: None)
-            if "small" in search.best:
-                last.append(search.best["small"].x)
-            return "small" in search.best
+            search.finish()
+            best = search.best.get("small")
+            if best is None:
+                return math.inf
+            last.append(best.x)
+            return float(search.terms.scale_mm * best.certificate.ranges[:, 1].max())
 
         if stop():
             break

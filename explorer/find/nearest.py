@@ -23,8 +23,10 @@ HALVINGS, ROOM = 5, 0.15
 # Largest half-angle of a joint's cone, in degrees.
 MOST_SWING = 80.0
 
-Keeps = Callable[[Requirement], bool]
-"""Whether a machine is found that keeps a requirement, beginning with the last one found."""
+Keeps = Callable[[Requirement, bool], float]
+"""The longest leg, in mm, of a machine that keeps a requirement, infinite if none is found.
+
+It begins with the last machine found, and lowers its legs as far as it can if it is told to."""
 
 
 def nearest_values(
@@ -36,7 +38,11 @@ def nearest_values(
         if kept is None:
             continue
         missed = 1.0 if kept == FACTORS[0] else FACTORS[FACTORS.index(kept) - 1]
-        for _ in range(HALVINGS):
+        least = keeps(relaxed(requirement, field, kept) or requirement, True)
+        own = requirement.legs.longest_mm
+        if field == "legs.longest_mm" and own and least < own * kept:
+            missed = kept = max(1.0, least / own)
+        for _ in range(HALVINGS if missed < kept else 0):
             middle = math.sqrt(missed * kept)
             if _keeps(requirement, field, middle, keeps):
                 kept = middle
@@ -44,13 +50,13 @@ def nearest_values(
                 missed = middle
         told = kept * (kept / missed) ** ROOM * (1.0 + 0.05 * min(1.0, kept - 1.0))
         found = relaxed(requirement, field, told)
-        if found is not None and keeps(found):
+        if found is not None and keeps(found, False) < math.inf:
             yield _in_words(found, field, told)
 
 
 def _keeps(requirement: Requirement, field: str, factor: float, keeps: Keeps) -> bool:
     found = relaxed(requirement, field, factor)
-    return found is not None and keeps(found)
+    return found is not None and keeps(found, False) < math.inf
 
 
 def relaxable_fields(requirement: Requirement) -> list[str]:

@@ -220,7 +220,7 @@ def design_of(
     swing = Swing(*(requirement.swing_deg,) * 6)
     radius = 0.5 * legs.diameter_mm / unit
     ends: list[Any] = (scale * ranges).tolist()
-    lengths: dict[str, Any] = dict(zip(LENGTHS, map(tuple, ends), strict=True))
+    lengths: dict[str, Any] = dict(zip(LENGTHS, map(tuple[Any, ...], ends), strict=True))
     limits = Limits(
         **lengths,
         margin=requirement.least_margin_mm / unit,
