@@ -17,8 +17,13 @@ from services import StubJobs, services_for
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.features.requirement import words
-from explorer.app.features.requirement.feature import REQUIREMENT, Checklist, RequirementPanel
-from explorer.app.features.requirement.runner import Finder
+from explorer.app.features.requirement.feature import (
+    PREPARE,
+    REQUIREMENT,
+    Checklist,
+    RequirementPanel,
+)
+from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import EDGES, box_corners
 from explorer.app.features.requirement.state import EXAMPLE, Required
 from explorer.app.features.requirement.work import CHECK_FEED
@@ -38,7 +43,7 @@ from explorer.find.answers import (
     RequirementCheck,
 )
 from explorer.find.requirement import Requirement, decode_requirement, encode_requirement
-from explorer.jobs.jobs import LongJob
+from explorer.jobs.jobs import LongJob, do_nothing
 from explorer.jobs.process import CANCELLED, Call
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
@@ -160,8 +165,11 @@ def test_gravity_and_data_sheet_are_taken_into_the_form(
 
 
 def test_search_shows_machines_as_they_are_found_and_drops_those_of_an_earlier_one(
-    services: Services, desk: Desk, panel: RequirementPanel, jobs: HeldJobs
+    services: Services, desk: Desk, panel: RequirementPanel, jobs: HeldJobs, buttons: Buttons
 ) -> None:
+    # The press that opens the form starts the processes that will be needed.
+    desk.press(buttons, PREPARE)
+    assert [order.task for order in jobs.orders] == [do_nothing, do_nothing]
     controls = start(services, desk, panel)
     assert jobs.searches[0][0] == EXAMPLE
     assert "Searching …" in markup_of(panel, desk.state)

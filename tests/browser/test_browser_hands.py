@@ -143,7 +143,7 @@ def test_dialog_and_card_of_keys_close_by_a_key_by_a_click_beside_and_by_their_b
             lambda: tab.page.mouse.click(5, 300),
             lambda: tab.page.get_by_role("button", name="Close the dialog").click(),
             # The same button of the bar.
-            lambda name=name: tab.page.locator(f"[data-opens={name}]").click(),
+            lambda name=name: tab.page.locator(f"[data-opens='{name}']").click(),
         )
         for close in closes:
             tab.open_dialog(name)

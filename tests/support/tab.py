@@ -349,7 +349,7 @@ class Tab:
 
     def open_dialog(self, name: str) -> None:
         """Open a dialog by its button in the bar."""
-        self.page.locator(f"[data-opens={name}]").first.click()
+        self.page.locator(f"[data-opens='{name}']").first.click()
         self.page.get_by_role("dialog", name=name).wait_for()
 
     def close_notices(self) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from explorer.app.state.frame import Frame
-from explorer.jobs.jobs import Jobs, LongJob
+from explorer.jobs.jobs import PAGE, Jobs, LongJob
 from explorer.jobs.process import CANCELLED, Channel
 from explorer.numerics.search import Watch, ignore_stage
 from explorer.page.session.clock import Pause, now
@@ -56,6 +56,7 @@ class FeedOf(Generic[Request, Drawing]):
         key: Key of the requests, of which the newest counts; the task if None.
         has_stages: Whether the task sends each `Stage`, and parts of the drawing as soon as they
             are known, and can be cancelled.
+        process: Name of the process of the task.
         in_scene: Whether drawings have the scale of the opened design, so that none is shown with a
             design of another size.
     """
@@ -64,6 +65,7 @@ class FeedOf(Generic[Request, Drawing]):
     request_of: Callable[[Frame], Request | None]
     key: object = None
     has_stages: bool = field(default=False, kw_only=True)
+    process: str = field(default=PAGE, kw_only=True)
     in_scene: bool = field(default=True, kw_only=True)
 
     def __call__(self, services: Any) -> Feed[Request, Drawing]:
@@ -194,6 +196,7 @@ class Feed(Generic[Request, Drawing]):
             lambda problem: self._show_problem(count, problem),
             receive if kind.has_stages else None,
             key=kind.task if kind.key is None else kind.key,
+            process=kind.process,
         )
         if kind.has_stages and before is not None:
             before.cancel(after=LONG_SECONDS)
@@ -229,6 +232,7 @@ class Feed(Generic[Request, Drawing]):
 
 
 def modules_of(feeds: Iterable[object]) -> tuple[str, ...]:
-    """Return the modules of the tasks of those feeds that are declared by `FeedOf`."""
+    """Return the modules of the tasks that the process of the page does for feeds of `FeedOf`."""
     kinds: list[FeedOf[Any, Any]] = [each for each in feeds if isinstance(each, FeedOf)]
+    kinds = [each for each in kinds if each.process == PAGE]
     return tuple(dict.fromkeys(each.task.__module__ for each in kinds))

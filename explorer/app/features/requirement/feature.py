@@ -8,7 +8,7 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.requirement import words
-from explorer.app.features.requirement.runner import Finder
+from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import RequiredBox
 from explorer.app.features.requirement.state import FORM, OpenFound, Required
 from explorer.app.features.requirement.work import CHECK_FEED
@@ -107,6 +107,7 @@ class RequirementPanel:
         self._check = self._controls.button("Check this design", CHECK_HINT, lambda: CHECK)
         self._button("Save as a file", SAVE_HINT, self._save)
         self._result = gui.add_html("")
+        services.buttons.on(PREPARE, lambda _, __: self._finder.prepare())
         services.buttons.on(words.RELAX, self._relax, values=INDICES)
         services.do_on_press(words.OPEN, self._open, INDICES)
 
@@ -217,11 +218,13 @@ def open_requirement(_: Services, data: bytes, name: str) -> tuple[Action, str]:
     return action, f"The requirement {form.name}; “{words.TITLE}” has it."
 
 
+PREPARE = "required.prepare"
 INDICES = tuple(map(str, range(10)))
 """The values of buttons of machines and of relaxations."""
 
 OPENS_HINT = "State what a machine must do, and find machines that do it."
-OPENS = open_button(words.TITLE, words.TITLE, hint=OPENS_HINT, class_name="ex-tool ex-outlined")
+LOOK = "ex-tool ex-outlined"
+OPENS = open_button(words.TITLE, words.TITLE, press=PREPARE, hint=OPENS_HINT, class_name=LOOK)
 
 REQUIREMENT = Feature(
     "requirement",
@@ -230,6 +233,5 @@ REQUIREMENT = Feature(
     bar=(InBar("left", lambda _: lambda __: OPENS), InBar("left", Checklist)),
     scene=(RequiredBox,),
     later_feeds=(CHECK_FEED,),
-    runners=(Finder,),
     openers={"box_mm": open_requirement},
 )

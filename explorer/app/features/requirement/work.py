@@ -1,4 +1,4 @@
-"""The tasks of the worker and of the process of the searches."""
+"""The check of the design and the search for machines, each in a process of its own."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _request_for(frame: Frame) -> tuple[Design, Requirement] | None:
     return None if required is None or frame.state.busy else (frame.state.design, required)
 
 
-CHECK_FEED = FeedOf(check_design, _request_for, in_scene=False)
+CHECK_FEED = FeedOf(check_design, _request_for, process="check", in_scene=False)
 
 
 def find_machines(requirement: Requirement, channel: Channel) -> FoundDesigns:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Runner, Services
+from explorer.app.features.feature import Services
 from explorer.app.features.requirement.state import EXAMPLE
-from explorer.app.features.requirement.work import find_machines
+from explorer.app.features.requirement.work import CHECK_FEED, find_machines
 from explorer.app.session.session import Who
-from explorer.app.state.frame import Frame
 from explorer.find.answers import FoundDesigns
 from explorer.find.requirement import Requirement
 from explorer.jobs.jobs import LongJob
@@ -20,7 +19,7 @@ DIED = "the process of the search died; “Find machines” starts it again"
 PATIENCE = 2.0
 
 
-class Finder(Runner):
+class Finder:
     """Starts and cancels searches.
 
     Attributes:
@@ -36,12 +35,10 @@ class Finder(Runner):
         self.job: LongJob | None = None
         self._count = 0
 
-    def follow(self, frame: Frame) -> None:
-        """Leave the search as it is, which buttons begin and end."""
-
     def prepare(self) -> None:
-        """Start the process of the searches."""
-        self._services.jobs.prepare(FIND, [find_machines.__module__])
+        """Start the processes of searches and checks, before they are needed."""
+        for process in (FIND, CHECK_FEED.process):
+            self._services.jobs.prepare(process, [find_machines.__module__])
 
     def start(self, requirement: Requirement, who: Who = None) -> None:
         """Search for machines, in place of a search that is under way."""
