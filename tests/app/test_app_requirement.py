@@ -278,7 +278,7 @@ def test_checklist_says_what_is_missed_by_how_much_and_a_press_goes_there(
         "1.77 ≤ 1.8",
         "6.2 ≥ 5 mm",
         "No violation in 50000 poses.",
-        "47.3 ≤ 45°",
+        "47.3 > 45°",
         "by 2.3°",
         "Carriages meet.",
     ):

@@ -111,8 +111,9 @@ def _demand_row(demand: DemandCheck) -> str:
     worst, limit, short = (
         format_number(value, 3) for value in (demand.worst, demand.limit, -demand.spare)
     )
-    is_least = (demand.worst > demand.limit) == demand.kept and demand.worst != demand.limit
-    values = f"{worst} {'≥' if is_least else '≤'} {limit}{unit}" if demand.worst else ""
+    signs = "≥≤" if demand.kept else "><"
+    sign = signs[demand.worst <= demand.limit]
+    values = f"{worst} {sign} {limit}{unit}" if demand.worst else ""
     missed = f"by {short}{unit}" if demand.spare else "no"
     level, mark = ("within", "✓") if demand.kept else ("beyond", missed)
     name = escape(f"{demand.name[:1].upper()}{demand.name[1:]}")
