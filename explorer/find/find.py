@@ -40,6 +40,8 @@ UNITS_PER_SECOND = 250.0
 BLOCK_UNITS, EVALUATION_UNITS, CERTIFICATE_UNITS = 50.0, 1.0, 20.0
 # Seconds of a search for a relaxed requirement.
 RELAXED_SECONDS = 3.0
+# Seconds of the search for nearest values for each second of a search.
+NEAREST_SECONDS = 2.0
 # Factor on the seconds after which a search ends on a slow machine all the same.
 PATIENCE = 4.0
 # Rounds of an improvement and a certificate, and cells of poses of the latter.
@@ -79,7 +81,7 @@ class Search:
         units: Units of work that it may take.
         ends: Time of the clock at which it ends at the latest.
         stop: Function that says whether to end.
-        is_first_enough: Whether the first machine ends the search.
+        enough: Longest leg over the diagonal of the box that ends the search.
         best: The best machine of each kind.
     """
 
@@ -89,7 +91,7 @@ class Search:
     ends: float
     stop: Callable[[], bool]
     seed: int
-    is_first_enough: bool = False
+    enough: float = 0.0
     best: dict[Preference, Machine] = field(default_factory=dict[Preference, Machine])
     done: float = 0.0
     is_cancelled: bool = False
@@ -105,12 +107,21 @@ class Search:
 
     def run(self, start: FloatArray | None, tell: Callable[[], None]) -> None:
         """Search from a start, or from random machines, and tell each time one is better."""
+        if start is None and math.isfinite(self.terms.longest):
+            # Legs are shortened without a limit first, which most machines are far beyond.
+            free = replace(self.terms, longest=math.inf)
+            short = replace(self, terms=free, kinds=("small",), enough=self.terms.longest, best={})
+            short.run(None, lambda: None)
+            self.done, self.is_cancelled = short.done, short.is_cancelled
+            if "small" not in short.best:
+                return
+            start = short.best["small"].x
         try:
             for each in self._starts(start):
                 found = each if isinstance(each, Machine) else self.improve(*each)
                 if found is not None and self._add(found):
                     tell()
-                    if self.is_first_enough:
+                    if found.certificate.ranges[:, 1].max() <= self.enough:
                         return
         except Stop:
             return
@@ -290,8 +301,8 @@ def find_designs(
 def _nearest(
     requirement: Requirement, seed: int, seconds: float, stop: Callable[[], bool]
 ) -> tuple[Relaxation, ...]:
-    """Return the nearest values of the demands that can be relaxed, some seconds each."""
-    found: list[Relaxation] = []
+    """Return the nearest values of demands, as many as are found in about the given seconds."""
+    found, left = list[Relaxation](), [UNITS_PER_SECOND * NEAREST_SECONDS * seconds]
     for name in relaxable_fields(requirement):
         last: list[FloatArray] = []
 
@@ -299,20 +310,23 @@ def _nearest(
             if impossible_demands(relaxed):
                 return math.inf
             allowed = min(seconds, RELAXED_SECONDS) * (3.0 if is_thorough else 1.0)
-            units = UNITS_PER_SECOND * allowed
-            ends, is_first = time.perf_counter() + PATIENCE * allowed, not is_thorough
-            search = Search(
-                Terms.of(relaxed), ("small",), units, ends, stop, seed, is_first_enough=is_first
+            # What was found last is certified even if no more work is left.
+            units = max(min(UNITS_PER_SECOND * allowed, left[0]), 5.0 * CERTIFICATE_UNITS)
+            ends, enough = (
+                time.perf_counter() + PATIENCE * allowed,
+                0.0 if is_thorough else math.inf,
             )
+            search = Search(Terms.of(relaxed), ("small",), units, ends, stop, seed, enough)
             search.run(last[-1] if last else None, lambda: None)
             search.finish()
+            left[0] -= search.done + CERTIFICATE_UNITS
             best = search.best.get("small")
             if best is None:
                 return math.inf
             last.append(best.x)
             return float(search.terms.scale_mm * best.certificate.ranges[:, 1].max())
 
-        if stop():
+        if stop() or left[0] <= 0.0:
             break
         found += nearest_values(requirement, [name], keeps)
     return tuple(found)

@@ -210,7 +210,9 @@ class Improvement:
         less far.
         """
         x, trusted = self.start.copy(), TRUSTED
-        bounds = self._first_bounds(x, poses)
+        lows, highs = _ranges(self, x)
+        free = len(self.free)
+        bounds = np.clip(self._first_bounds(x, poses), lows[free:], highs[free:])
         missed, cost = self.missed(x, poses, bounds), self._cost(bounds)
         rows = self._worst_rows(x, poses, bounds)
         for turn in range(rounds):
@@ -258,8 +260,12 @@ class Improvement:
             table = self.table(machines, looked, given[:, n:])[:, rows[:, 0], places]
             slope = np.zeros(len(y))
             slope[n + 4] = self.weights[LENGTH] / y[n + 4]
+            # Too long a leg costs, so that steps towards shorter ones need not be at the end of it.
+            over = max(0.0, y[n + 4] - self.terms.longest * (1.0 - RESERVE))
+            slope[n + 4] += COST_OF_LENGTH * (over > 0.0)
             slope[n + 5 :] = [self.weights[kind] for kind in self.extra]
-            return self._cost(y[n:]), slope, table[0].real, (table[1:].imag / STEP).T
+            cost = self._cost(y[n:]) + COST_OF_LENGTH * over
+            return cost, slope, table[0].real, (table[1:].imag / STEP).T
 
         y = np.concatenate([x[free], bounds])
         near = np.full(len(y), math.inf)
@@ -286,7 +292,9 @@ class Improvement:
         """Return the largest amount by which a demand is missed in poses; 0 if none is."""
         with np.errstate(all="ignore"):
             least = float(np.min(self.table(x[None], poses, bounds[None])))
-        return max(0.0, -least) if math.isfinite(least) else math.inf
+        if not math.isfinite(least):
+            return math.inf
+        return max(0.0, -least, float(bounds[4]) - self.terms.longest)
 
 
 # Poses at which each demand is looked at in the beginning, and amount that is no miss.
@@ -295,7 +303,7 @@ FEASIBLE = 1e-6
 # Largest change of a variable in a round, and change of the cost that ends the rounds.
 TRUSTED, LEAST_TRUSTED, SETTLED = 0.3, 2e-3, 1e-3
 # Weight of what is missed beside the cost, and steps of the solver in a round.
-COST_OF_MISSES, STEPS = 30.0, 12
+COST_OF_MISSES, COST_OF_LENGTH, STEPS = 30.0, 20.0, 12
 # Rounds after which a machine that misses a demand by more than this is given up.
 PATIENCE, HOPELESS, LONG = 3, 0.02, 10
 
@@ -314,5 +322,5 @@ def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]
     free = search.free
     count = len(search.extra)
     least = [0.02] * 4 + [0.1] + [-30.0] * count
-    most = [FARTHEST] * 4 + [min(FARTHEST, search.terms.longest)] + [30.0] * count
+    most = [FARTHEST] * 5 + [30.0] * count
     return np.array([*lows[free], *least]), np.array([*highs[free], *most])

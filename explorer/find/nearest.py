@@ -20,6 +20,8 @@ from explorer.find.requirement import MOST_TILT, Requirement
 FACTORS = (1.25, 1.6, 2.5, 4.0)
 # Halvings of the way back, and the share of it that is left as room for a new search.
 HALVINGS, ROOM = 5, 0.15
+# Factor on the longest leg found that leaves room for a new search.
+ROOM_OF_LEGS = 1.12
 # Largest half-angle of a joint's cone, in degrees.
 MOST_SWING = 80.0
 
@@ -34,24 +36,38 @@ def nearest_values(
 ) -> Iterator[Relaxation]:
     """Yield the nearest values of some fields of a requirement."""
     for field in fields:
-        kept = next((f for f in FACTORS if _keeps(requirement, field, f, keeps)), None)
-        if kept is None:
-            continue
-        missed = 1.0 if kept == FACTORS[0] else FACTORS[FACTORS.index(kept) - 1]
-        least = keeps(relaxed(requirement, field, kept) or requirement, True)
         own = requirement.legs.longest_mm
-        if field == "legs.longest_mm" and own and least < own * kept:
-            missed = kept = max(1.0, least / own)
-        for _ in range(HALVINGS if missed < kept else 0):
-            middle = math.sqrt(missed * kept)
-            if _keeps(requirement, field, middle, keeps):
-                kept = middle
-            else:
-                missed = middle
+        if field == "legs.longest_mm" and own:
+            free = msgspec.structs.replace(requirement.legs, longest_mm=None)
+            least = keeps(msgspec.structs.replace(requirement, legs=free), True)
+            kept = missed = max(1.0, ROOM_OF_LEGS * least / own)
+        else:
+            kept, missed = _nearest_factor(requirement, field, keeps)
+        if kept == math.inf:
+            continue
         told = kept * (kept / missed) ** ROOM * (1.0 + 0.05 * min(1.0, kept - 1.0))
         found = relaxed(requirement, field, told)
         if found is not None and keeps(found, False) < math.inf:
             yield _in_words(found, field, told)
+
+
+def _nearest_factor(requirement: Requirement, field: str, keeps: Keeps) -> tuple[float, float]:
+    """Return the least factor on a demand that a machine keeps, and the largest that none does."""
+    missed = 1.0
+    for kept in FACTORS:
+        if _keeps(requirement, field, kept, keeps):
+            break
+        missed = kept
+    else:
+        return math.inf, math.inf
+    keeps(relaxed(requirement, field, kept) or requirement, True)
+    for _ in range(HALVINGS):
+        middle = math.sqrt(missed * kept)
+        if _keeps(requirement, field, middle, keeps):
+            kept = middle
+        else:
+            missed = middle
+    return kept, missed
 
 
 def _keeps(requirement: Requirement, field: str, factor: float, keeps: Keeps) -> bool:
@@ -62,8 +78,8 @@ def _keeps(requirement: Requirement, field: str, factor: float, keeps: Keeps) ->
 def relaxable_fields(requirement: Requirement) -> list[str]:
     """Return the demands that may be relaxed, those first that a user gives up most readily."""
     legs = requirement.legs
-    fields = ["tilt_deg"] * (requirement.tilt_deg > 0.0) + ["box_mm"]
-    fields += ["legs.longest_mm"] * (legs.longest_mm is not None)
+    fields = ["legs.longest_mm"] * (legs.longest_mm is not None)
+    fields += ["tilt_deg"] * (requirement.tilt_deg > 0.0) + ["box_mm"]
     fields += ["legs.ratio"] * (legs.ratio is not None)
     fields += ["swing_deg"] * (requirement.swing_deg is not None)
     fields += ["legs.push_n"] * (legs.push_n is not None)

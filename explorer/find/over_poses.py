@@ -146,7 +146,8 @@ class _OverPoses:
         Cells are given by half their edges (k, 5) and their largest tilts (k,).
         """
         if not self.kinds:
-            return (np.zeros((len(poses.places), 0)),) * 2
+            none = np.zeros((len(poses.places), 0))
+            return none, none
         at = self.terms.values(self.x, poses)
         values = self._amounts(at, np.asarray, m.norm)
         if half is None or tilts is None:
