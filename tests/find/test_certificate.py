@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -106,7 +107,7 @@ def test_machine_values_with_an_imaginary_step_are_derivatives() -> None:
     x = random_machine(random, tool=True)
     poses = poses_of(random_places(random, terms, 5))
 
-    def values(machine: FloatArray) -> FloatArray:
+    def values(machine: Any) -> Any:
         at = terms.values(machine, poses)
         rows = [*at.lengths, *at.margins, *at.distances, *at.tool_speeds, *at.transmissions]
         rows += at.swings(terms.values(machine, HOME))

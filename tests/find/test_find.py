@@ -70,7 +70,8 @@ def test_find_designs_keep_the_requirement_in_all_poses(changes: dict[str, objec
         assert check.kept, [demand.name for demand in check.missed]
         assert each.longest_mm >= found.bound_mm
         assert each.design.required_box is not None
-        edges = np.subtract(*each.design.required_box[::-1]) * each.design.unit_mm
+        lows, highs = np.array(each.design.required_box)
+        edges = (highs - lows) * each.design.unit_mm
         assert edges == pytest.approx(requirement.box_mm)
         if requirement.buildable:
             built = buildability(each.design)
