@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
+import msgspec
 import numpy as np
 
 from explorer.find.answers import FoundDesign, FoundDesigns, Relaxation
@@ -267,7 +268,11 @@ def find_designs(
     checks.whole("seed", seed, 0, 2**31 - 1)
     seconds = checks.positive("seconds", seconds)
     terms = Terms.of(requirement)
-    bound, impossible = least_longest_mm(requirement), impossible_demands(requirement)
+    bounded = requirement
+    if design is not None and any(design.tool.position):
+        # The tool stays beside b4, whose bounds do not hold then.
+        bounded = msgspec.structs.replace(requirement, free=(*requirement.free, "tool"))
+    bound, impossible = least_longest_mm(bounded), impossible_demands(bounded)
     kinds = tuple(dict.fromkeys((preferred, *OTHER_KINDS)))[:count]
     if impossible:
         refused = FoundDesigns((), bound, impossible, status="impossible")

@@ -6,6 +6,7 @@ import itertools
 import math
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -13,8 +14,9 @@ from needs import NEEDS, requirement_of
 from scipy.spatial.transform import Rotation
 from statics_cases import random_poses
 
-from explorer import PRESETS, actuator_forces, compliance, worst_error
+from explorer import PRESETS, Tool, actuator_forces, compliance, worst_error
 from explorer.find.bound import impossible_demands, least_longest_mm
+from explorer.find.find import find_designs
 from explorer.find.requirement import RequiredLegs, RequiredLoad, RequiredMotion, Requirement
 from explorer.numerics.arrays import FloatArray, dot, lengths_of
 
@@ -181,6 +183,16 @@ def test_least_longest_leg_is_finite_just_where_leg_4_can_swing() -> None:
         swings = required(tilt_deg=15.0, swing_deg=least, free=free)
         assert math.isinf(least_longest_mm(swings))
         assert any("swing" in clause for clause in impossible_demands(swings))
+
+
+def test_search_from_a_design_with_a_tool_beside_b4_is_not_refused_for_b4() -> None:
+    requirement = required(tilt_deg=15.0, swing_deg=10.0)
+    start = PRESETS["paper-optimal"]
+    beside = msgspec.structs.replace(start, tool=Tool((0.0, 0.0, 3.0)))
+    found = [find_designs(requirement, design=each, stop=lambda: True) for each in (start, beside)]
+    assert [each.status for each in found] == ["impossible", "cancelled"]
+    assert math.isinf(found[0].bound_mm)
+    assert math.isfinite(found[1].bound_mm)
 
 
 def test_least_longest_leg_of_parts_has_its_dead_length() -> None:
