@@ -33,6 +33,8 @@ from explorer.prototype.fitting import buildability
 
 # Tolerance of lengths over the diagonal of the box, with which found designs keep their own limits.
 CLOSE = 1e-7
+# Demands of which a singular pose keeps none.
+UNBOUNDED = ("force", "transmission", "error", "deflection")
 
 
 def check_requirement(design: Design, requirement: Requirement) -> RequirementCheck:
@@ -196,6 +198,13 @@ class _Check:
         proven = bool(found.demands[rows].all())
         missed, poses = found.missed_demands, found.demand_poses
         row = max(rows, key=lambda i: missed[i])
+        margins = [i for i, name in enumerate(self.limits) if name.startswith("margin")]
+        closest = max(margins, key=lambda i: found.missed_limits[i])
+        if kind in UNBOUNDED and found.missed_limits[closest] >= self.terms.margin:
+            # The box is on both sides of a singular plane.
+            at = found.limit_poses.at(slice(closest, closest + 1))
+            most = self.terms.transmission if kind == "transmission" else math.inf
+            return _Worst(most, self.names[row].split(maxsplit=1)[-1], at, False)
         name = self.names[row].split(maxsplit=1)[-1]
         if kind == "clearance":
             name = pair_name(PAIRS[row])

@@ -127,6 +127,11 @@ def test_check_of_the_papers_optimum_tells_what_it_misses_and_where() -> None:
     assert not check.kept
     for demand in check.demands:
         assert demand.kept == (demand.spare >= -1e-3) or demand.name == "buildable"
+    # Its box is on both sides of a singular plane, where no force holds a load.
+    rows = {demand.name.split()[0]: demand for demand in check.demands}
+    assert rows["margin"].worst < 0.0
+    assert rows["force"].worst == math.inf
+    assert rows["transmission"].worst == 0.0
     # The worst pose of the longest leg has its length.
     worst = check.demands[0]
     assert worst.pose is not None
