@@ -312,7 +312,7 @@ def _nearest(
         last: list[FloatArray] = []
 
         def keeps(relaxed: Requirement, is_thorough: bool, last: list[FloatArray] = last) -> float:
-            if impossible_demands(relaxed):
+            if impossible_demands(relaxed) or (left[0] <= 0.0 and not last):
                 return math.inf
             allowed = min(seconds, RELAXED_SECONDS) * (3.0 if is_thorough else 1.0)
             # What was found last is certified even if no more work is left.
@@ -323,7 +323,6 @@ def _nearest(
             )
             search = Search(Terms.of(relaxed), ("small",), units, ends, stop, seed, enough)
             search.run(last[-1] if last else None, lambda: None)
-            search.finish()
             left[0] -= search.done + CERTIFICATE_UNITS
             best = search.best.get("small")
             if best is None:

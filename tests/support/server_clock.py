@@ -10,6 +10,7 @@ from unittest import mock
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.optimise.runner import SEARCH
 from explorer.app.features.optimise.state import Optimisation
+from explorer.app.features.requirement.work import CHECK_FEED
 from explorer.app.page import Page
 from explorer.jobs.jobs import PAGE
 from explorer.page.session import clock
@@ -48,7 +49,7 @@ def wait_until_drawn(page: Page, timeout: float = 30.0) -> bool:
     while Optimisation.of(page.session.state).is_on and time.monotonic() < deadline:
         time.sleep(0.02)
     # Drawing may request a job, whose result is drawn again.
-    for process in (SEARCH, PAGE, PAGE):
+    for process in (SEARCH, CHECK_FEED.process, PAGE, PAGE):
         idle = idle and page.session.wait_until_idle(deadline - time.monotonic())
         idle = idle and page.jobs.wait_until_idle(deadline - time.monotonic(), process)
     return idle and page.session.wait_until_idle(deadline - time.monotonic())
