@@ -182,7 +182,7 @@ def test_search_shows_machines_as_they_are_found_and_drops_those_of_an_earlier_o
     assert "No machine has legs below 342 mm." in content
     assert "is-outdated" not in content
     # The form has changed since.
-    desk.use(controls["Tilt (°)"], 20.0)
+    desk.use(controls["Largest tilt (°)"], 20.0)
     assert "is-outdated" in markup_of(panel, desk.state)
     press(controls["Cancel"])
     assert jobs.searches[0][2].is_to_end
@@ -224,7 +224,7 @@ def test_machine_that_is_opened_has_its_requirement_beside_it_and_one_undo_takes
 ) -> None:
     controls = start(services, desk, panel)
     jobs.answer("done", FoundDesigns((answer(),), 342.0))
-    desk.use(controls["Tilt (°)"], 20.0)
+    desk.use(controls["Largest tilt (°)"], 20.0)
     desk.press(buttons, words.OPEN, 1)
     assert desk.state.design == OPTIMAL
     desk.press(buttons, words.OPEN, 0)

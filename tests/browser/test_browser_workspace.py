@@ -61,7 +61,7 @@ def rest_on(tab: Tab, across: float, up: float) -> Locator:
     box = map_in(tab).bounding_box()
     assert box is not None
     tab.page.mouse.move(box["x"] + across * box["width"], box["y"] + up * box["height"])
-    return tab.page.locator(".ex-reading")
+    return tab.page.locator(".ex-reading:visible")
 
 
 def read_at(tab: Tab, across: float, up: float, words: re.Pattern[str]) -> re.Match[str]:
@@ -87,14 +87,14 @@ def test_map_is_read_and_the_reading_stays_while_it_is_drawn_again(tab: Tab) -> 
     # Its type is legible in a panel as narrow as this.
     assert min(map_in(tab).evaluate(TYPE_SIZES)) >= 11.0 - 1e-3
     hint = "Point at the map to read it, click to go there."
-    expect(tab.page.locator(".ex-reading")).to_have_text(hint)
+    expect(tab.page.locator(".ex-reading:visible")).to_have_text(hint)
     # Beside the outline, and beside the frame.
     expect(rest_on(tab, 0.2, 0.1)).to_contain_text("beyond the limits")
     expect(rest_on(tab, 0.02, 0.02)).to_have_text(hint)
     read_at(tab, 0.6, 0.4, READING)
-    before = tab.page.locator(".ex-reading").inner_text()
+    before = tab.page.locator(".ex-reading:visible").inner_text()
     move_cut(tab, 5.0)
-    expect(tab.page.locator(".ex-reading")).to_have_text(before)
+    expect(tab.page.locator(".ex-reading:visible")).to_have_text(before)
 
 
 def test_reading_follows_the_mechanism_while_the_pointer_rests(tab: Tab) -> None:
@@ -102,7 +102,7 @@ def test_reading_follows_the_mechanism_while_the_pointer_rests(tab: Tab) -> None
     session.do(Set("view.workspace.colour", "condition"))
     open_map(tab, 6.0)
     words = re.compile(r"x ([−\d.]+), z ([−\d.]+) units: 1 / cond J ([\d.]+)")
-    reading = tab.page.locator(".ex-reading")
+    reading = tab.page.locator(".ex-reading:visible")
     read_at(tab, 0.6, 0.4, words)
 
     def is_of_the_state() -> bool:

@@ -36,7 +36,7 @@ Field = tuple[str, str, float, str]
 """A number of the form: its label, its field, its step, and what it means."""
 
 TASK: Sequence[Field] = (
-    ("Tilt (°)", "tilt_deg", 1.0, "Largest tilt from home, about any level axis."),
+    ("Largest tilt (°)", "tilt_deg", 1.0, "Largest tilt from home, about any level axis."),
     ("Payload (kg)", "payload.mass_kg", 0.1, "Mass of tool and payload."),
     ("Force (N)", "payload.force_n", 1.0, "Force of the process, of any direction."),
 )
