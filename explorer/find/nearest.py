@@ -8,7 +8,7 @@ last value that was kept, so that a new search finds it too, and it is checked.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
 
@@ -32,7 +32,7 @@ It begins with the last machine found, and lowers its legs as far as it can if i
 
 
 def nearest_values(
-    requirement: Requirement, fields: Iterator[str] | list[str], keeps: Keeps
+    requirement: Requirement, fields: Sequence[str], keeps: Keeps
 ) -> Iterator[Relaxation]:
     """Yield the nearest values of some fields of a requirement."""
     for field in fields:
