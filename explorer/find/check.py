@@ -72,6 +72,14 @@ class _Worst(NamedTuple):
     proven: bool
 
 
+def _at_most(
+    name: str, value: float, limit: float, unit: str, pose: Pose | None, proven: bool
+) -> DemandCheck:
+    """Return the check of a value that must not exceed a limit."""
+    kept = value <= limit * (1.0 + CLOSE)
+    return DemandCheck(name, kept, value, limit, limit - value, unit, pose, kept and proven)
+
+
 class _Check:
     """The demands of a requirement on one machine."""
 
@@ -156,33 +164,15 @@ class _Check:
             used_ratios = used[:, 1] / used[:, 0]
             leg = int(used_ratios.argmax())
             value = float(used_ratios[leg])
-            kept = value <= ratio * (1.0 + CLOSE)
             is_proven = proven and bool((own_ratios <= ratio * (1.0 + 1e-5)).all())
-            yield DemandCheck(
-                f"ratio of {LENGTHS[leg]}",
-                kept,
-                value,
-                ratio,
-                ratio - value,
-                "",
-                self._pose(found.limit_poses.at(slice(leg, leg + 1))),
-                kept and is_proven,
-            )
+            pose = self._pose(found.limit_poses.at(slice(leg, leg + 1)))
+            yield _at_most(f"ratio of {LENGTHS[leg]}", value, ratio, "", pose, is_proven)
         longest = self.terms.requirement.legs.longest_mm
         if longest is not None:
             leg = int(used[:, 1].argmax())
             value = size * float(used[leg, 1])
-            kept = value <= longest * (1.0 + CLOSE)
-            yield DemandCheck(
-                f"longest leg ({LENGTHS[leg]})",
-                kept,
-                value,
-                longest,
-                longest - value,
-                "mm",
-                self._pose(found.limit_poses.at(slice(leg, leg + 1))),
-                kept and proven,
-            )
+            pose = self._pose(found.limit_poses.at(slice(leg, leg + 1)))
+            yield _at_most(f"longest leg ({LENGTHS[leg]})", value, longest, "mm", pose, proven)
 
     def _worst_limit(self, kind: str) -> _Worst:
         found = self.found
@@ -238,16 +228,9 @@ class _Check:
         angles = np.degrees(np.arccos(np.clip(np.diag(cosines), -1.0, 1.0)))
         joint, limit = int(angles.argmax()), math.degrees(terms.swing)
         value = float(angles[joint])
-        kept = value <= limit * (1.0 + CLOSE)
-        return DemandCheck(
-            f"swing at {SWINGS[joint]}",
-            kept,
-            value,
-            limit,
-            limit - value,
-            "°",
-            self._pose(poses.at(slice(joint, joint + 1))),
-            kept and bool(found.limits[rows].all()),
+        pose = self._pose(poses.at(slice(joint, joint + 1)))
+        return _at_most(
+            f"swing at {SWINGS[joint]}", value, limit, "°", pose, bool(found.limits[rows].all())
         )
 
     def _hull(self, limit: float) -> DemandCheck:
