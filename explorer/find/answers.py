@@ -14,7 +14,8 @@ class DemandCheck(NamedTuple):
     """One demand of a requirement, checked for a design.
 
     Attributes:
-        name: Name of the demand, such as "length l1" or "clearance of legs 1 and 4".
+        name: Name of the demand, such as "force".
+        item: What has the worst value, such as "d1"; "" for the design as a whole.
         kept: Whether it is kept in every pose that was looked at.
         worst: Worst value that was found, in `unit`; infinite where a pose is singular.
         limit: Limit of that value.
@@ -26,6 +27,7 @@ class DemandCheck(NamedTuple):
     """
 
     name: str
+    item: str
     kept: bool
     worst: float
     limit: float
@@ -34,6 +36,11 @@ class DemandCheck(NamedTuple):
     pose: Pose | None
     proven: bool
     remark: str = ""
+
+    @property
+    def words(self) -> str:
+        """The name with what has the worst value."""
+        return f"{self.name} ({self.item})" if self.item else self.name
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.find import machine_values as m
-from explorer.find.machine_values import HOME, BoxPoses, MachineValues
-from explorer.find.over_tilts import CORNERS
+from explorer.find.machine_values import HOME, MachineValues
+from explorer.find.over_tilts import CORNERS, poses_over
 from explorer.find.terms import Terms, part_slacks
 from explorer.numerics.arrays import FloatArray
 
@@ -29,19 +29,14 @@ AZIMUTHS = 8
 NEARLY = 0.6
 
 
-def standard_poses(tilt: float) -> BoxPoses:
+def standard_poses(tilt: float) -> FloatArray:
     """Return home, the corners of the box, and the corners at the largest tilt."""
     angles = 2.0 * math.pi * np.arange(AZIMUTHS) / AZIMUTHS
-    vectors = tilt * np.column_stack([np.cos(angles), np.sin(angles)])
-    corners = BoxPoses(CORNERS, np.zeros((8, 2)))
-    found = HOME.plus(corners)
-    if tilt > 0.0:
-        tilted = BoxPoses(np.repeat(CORNERS, AZIMUTHS, axis=0), np.tile(vectors, (8, 1)))
-        found = found.plus(tilted)
-    return found
+    tilts = [(0.0, 0.0), *((angle, tilt) for angle in angles if tilt > 0.0)]
+    return np.concatenate([HOME, poses_over(CORNERS, np.array(tilts))])
 
 
-def misses(terms: Terms, at: MachineValues, home: MachineValues) -> tuple[FloatArray, FloatArray]:
+def misses(terms: Terms, at: MachineValues) -> tuple[FloatArray, FloatArray]:
     """Return what machines (n, variables) miss over poses, and their longest legs, (n,) each.
 
     What is missed is the largest share by which a demand is exceeded, negative if all are kept.
@@ -50,18 +45,18 @@ def misses(terms: Terms, at: MachineValues, home: MachineValues) -> tuple[FloatA
     longest, shortest = lengths.max(axis=1), lengths.min(axis=1)
     large = longest.max(axis=1)
     found = [(longest / shortest).max(axis=1) / terms.ratio - 1.0, large / terms.longest - 1.0]
-    signed = [np.sign(own) * each for own, each in zip(home.margins, at.margins, strict=True)]
+    signed = [side * each for side, each in zip(at.sides[:3], at.margins, strict=True)]
     least = np.min([each.min(axis=1) for each in signed], axis=0)
     found.append((terms.margin - least) / (0.1 * large))
     if terms.swing < math.pi:
-        cosine = np.min([each.min(axis=1) for each in at.swings(home)], axis=0)
+        cosine = np.min([each.min(axis=1) for each in at.swings], axis=0)
         swing = np.arccos(np.clip(cosine, -1.0, 1.0))
         found.append(swing / terms.swing - 1.0)
     if terms.distance > 0.0:
-        near = np.min([each.min(axis=1) for each in at.uncrossed_distances(home)], axis=0)
+        near = np.min([each.min(axis=1) for each in at.uncrossed_distances], axis=0)
         found.append(1.0 - near / terms.distance)
     if terms.parts is not None:
-        tight = [np.asarray(each).min(axis=-1) for each in part_slacks(terms.parts, home)]
+        tight = [np.asarray(each).min(axis=-1) for each in part_slacks(terms.parts, at.home)]
         found.append(-np.min(np.broadcast_arrays(*tight), axis=0) / (0.2 * large))
         found.append(((longest + terms.parts.dead) / (2.0 * shortest)).max(axis=1) - 1.0)
     return np.max(found, axis=0), large
@@ -72,7 +67,7 @@ def candidates(terms: Terms, seed: int) -> Iterator[tuple[FloatArray, FloatArray
     count = m.TILT if "tool" in terms.requirement.free else m.TX
     random = np.random.default_rng(seed)
     poses = standard_poses(terms.tilt)
-    looks = [poses.at(slice(0, 3)), poses.at(slice(0, 9)), poses]
+    looks = [poses[:3], poses[:9], poses]
     while True:
         shares = random.random((BLOCK, count))
         x = np.ones((BLOCK, len(m.VARIABLES)))
@@ -86,7 +81,7 @@ def candidates(terms: Terms, seed: int) -> Iterator[tuple[FloatArray, FloatArray
         large = missed
         for look in looks:
             with np.errstate(divide="ignore", invalid="ignore"):
-                missed, large = misses(terms, terms.values(x, look), terms.values(x, HOME))
+                missed, large = misses(terms, terms.values(x, look))
             kept = missed < NEARLY
             x, missed, large = x[kept], missed[kept], large[kept]
         yield x, missed, large

@@ -12,10 +12,11 @@ import numpy as np
 
 from explorer.find import machine_values as m
 from explorer.find.candidates import standard_poses
-from explorer.find.machine_values import BoxPoses
-from explorer.find.over_poses import missed_amounts, poses_of, prove_demands, sample_demands
-from explorer.find.over_tilts import limit_names, prove_limits, worst_place
+from explorer.find.demands import demands_of, limits_of
+from explorer.find.over_poses import look_at, prove_demand, sample_demand
+from explorer.find.over_tilts import prove_limits
 from explorer.find.terms import Terms
+from explorer.mechanism.design import LENGTHS
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.cells import CellValues
 
@@ -30,77 +31,69 @@ SAMPLES = 20_000
 # Rounds in which the ranges of the lengths grow until nothing exceeds them.
 ROUNDS = 6
 
+LENGTH = "length"
+"""Name of the demand on lengths to stay within limits of their own."""
+
 
 @dataclass(frozen=True)
 class Certificate:
     """What holds for one machine over the whole box and all tilts.
 
+    The values are the longest and the shortest lengths of the legs, those of the `limits_of` a
+    requirement, and those of its `demands_of`.
+
     Attributes:
+        names: Names of their demands.
+        items: What each of them is of.
         ranges: Limits of the lengths of the legs, which no pose exceeds if they are proven, (4, 2).
-        limits: Proven limits: whether each of `limit_names` is proven, boolean.
-        missed_limits: Amounts by which each is missed at most, as far as it was found.
-        limit_poses: Poses with the worst values, a row for each limit.
-        demands: Whether each of `demand_names` is proven, boolean.
-        missed_demands: Amounts by which each is missed, in the worst pose that was found.
-        demand_poses: These poses.
+        missed: Amounts by which each misses its limit in the worst pose that was found.
+        poses: These poses, shape (n, 5).
+        proven: Whether each is proven to keep its limit, boolean.
     """
 
+    names: tuple[str, ...]
+    items: tuple[str, ...]
     ranges: FloatArray
-    limits: BoolArray
-    missed_limits: FloatArray
-    limit_poses: BoxPoses
-    demands: BoolArray
-    missed_demands: FloatArray
-    demand_poses: BoxPoses
-
-    @property
-    def missed(self) -> float:
-        """The largest amount by which a demand is missed where it was looked at."""
-        every = [*self.missed_limits.tolist(), *self.missed_demands.tolist()]
-        return max(every)
+    missed: FloatArray
+    poses: FloatArray
+    proven: BoolArray
 
     @property
     def is_kept(self) -> bool:
         """Whether no pose was found that misses a demand."""
-        return self.missed <= TOLERANCE
+        return bool(self.missed.max() <= TOLERANCE)
 
     @property
-    def is_proven(self) -> bool:
-        """Whether all demands are proven."""
-        return bool(self.limits.all() and self.demands.all())
-
-    @property
-    def worst_poses(self) -> BoxPoses:
+    def worst_poses(self) -> FloatArray:
         """The poses that miss a demand, or nearly do."""
-        limits = self.limit_poses.at(self.missed_limits > -NEARLY)
-        return limits.plus(self.demand_poses.at(self.missed_demands > -NEARLY))
+        return self.poses[self.missed > -NEARLY]
+
+    def rows(self, name: str) -> list[int]:
+        """Return the rows of the values of a demand."""
+        return [row for row, each in enumerate(self.names) if each == name]
 
 
-def lengths_over(x: FloatArray, terms: Terms, poses: BoxPoses) -> FloatArray:
+def lengths_over(x: FloatArray, terms: Terms, poses: FloatArray) -> FloatArray:
     """Return the shortest and the longest length of each leg in poses, shape (4, 2)."""
     lengths = np.stack(np.broadcast_arrays(*terms.values(x, poses).lengths))
     return np.stack([lengths.min(axis=1), lengths.max(axis=1)], axis=1)
 
 
-def used_ranges(x: FloatArray, terms: Terms, poses: BoxPoses) -> FloatArray:
+def used_ranges(x: FloatArray, terms: Terms, poses: FloatArray) -> FloatArray:
     """Return the ranges of the lengths over all poses, a little wider, shape (4, 2).
 
     They grow from those in some poses by the worst poses that a proof finds.
     """
+    padding = np.array([1.0 - PADDING, 1.0 + PADDING])
     found = lengths_over(x, terms, poses)
     for _ in range(ROUNDS):
-        padded = found * [1.0 - PADDING, 1.0 + PADDING]
-        limits = prove_limits(x, terms, padded)
-        over = np.flatnonzero(limits.values[:8] > 0.0)
-        if not len(over):
-            return padded
-        for index in over.tolist():
-            worst = worst_place(x, terms, padded, index, limits.places[index])
-            more = lengths_over(x, terms, worst)
-            found = np.column_stack(
-                [np.minimum(found[:, 0], more[:, 0]), np.maximum(found[:, 1], more[:, 1])]
-            )
-    return found * [1.0 - PADDING, 1.0 + PADDING]
+        limits = prove_limits(x, terms, found * padding)
+        over = limits.values[:8] > 0.0
+        if not over.any():
+            break
+        poses = np.concatenate([poses, limits.places[:8][over]])
+        found = lengths_over(x, terms, poses)
+    return found * padding
 
 
 def certify(
@@ -109,62 +102,42 @@ def certify(
     *,
     ranges: FloatArray | None = None,
     cells: int | None = None,
-    poses: BoxPoses | None = None,
+    poses: FloatArray | None = None,
     is_quick: bool = False,
 ) -> Certificate:
     """Return the certificate of a machine with limits of its lengths, or with those that it uses.
 
     Without limits given, the lengths have to keep the ratio and the longest leg. At most `cells`
-    cells of poses are looked at; a quick certificate looks at none if a limit is missed. Demands
-    are also looked at in some poses.
+    cells of poses are looked at for each demand; a quick certificate looks at none if a limit is
+    missed. Demands are also looked at in some poses.
     """
     poses = standard_poses(terms.tilt) if poses is None else poses
-    names, count = limit_names(terms), 8
+    limits, demands = limits_of(terms), demands_of(terms)
     with np.errstate(all="ignore"):
         own = used_ranges(x, terms, poses) if ranges is None else ranges
-        limits = prove_limits(x, terms, own)
-        proven = limits.bounds <= TOLERANCE
-        missed = limits.values.copy()
-        # The lengths that are used must be those of legs that can be bought.
+        found = prove_limits(x, terms, own)
         if ranges is None:
-            over = np.maximum(own[:, 1] / own[:, 0] / terms.ratio, own[:, 1] / terms.longest) - 1.0
-            missed[:4] = np.maximum(missed[:4], over)
-            missed[4:8] = np.maximum(missed[4:8], own[:, 1] / own[:, 0] / terms.ratio - 1.0)
-            proven[:count] &= missed[:count] <= TOLERANCE
-        worst = [worst_place(x, terms, own, i, limits.places[i]) for i in range(len(names))]
-        places = BoxPoses(*map(np.concatenate, zip(*worst, strict=True)))
-        sampled = missed_amounts(x, terms, poses)
-        if missed.max() > TOLERANCE and is_quick:
-            k = sampled.shape[1]
-            found = CellValues(np.full(k, -np.inf), np.zeros((k, 5)), np.full(k, np.inf))
-        else:
-            found = prove_demands(x, terms, cells)
-            if (found.bounds > TOLERANCE).any() and (found.values <= TOLERANCE).all():
-                more = sample_demands(x, terms, SAMPLES)
-                is_more = more.values > found.values
-                found = CellValues(
-                    np.where(is_more, more.values, found.values),
-                    np.where(is_more[:, None], more.places, found.places),
-                    np.maximum(found.bounds, more.values),
-                )
-    values, at = found.values, poses_of(found.places)
-    if len(values):
-        rows = sampled.argmax(axis=0)
-        is_worse = sampled.max(axis=0) > values
-        values = np.where(is_worse, sampled.max(axis=0), values)
-        at = BoxPoses(
-            np.where(is_worse[:, None], poses.places[rows], at.places),
-            np.where(is_worse[:, None], poses.tilts[rows], at.tilts),
-        )
-    return Certificate(
-        ranges=own,
-        limits=proven,
-        missed_limits=np.where(np.isnan(missed), math.inf, missed),
-        limit_poses=places,
-        demands=np.maximum(found.bounds, values) <= TOLERANCE,
-        missed_demands=np.where(np.isnan(values), math.inf, values),
-        demand_poses=at,
-    )
+            # The lengths that are used must be those of legs that can be bought.
+            ratio = own[:, 1] / own[:, 0] / terms.ratio - 1.0
+            over = np.concatenate([np.maximum(ratio, own[:, 1] / terms.longest - 1.0), ratio])
+            found.values[:8] = np.maximum(found.values[:8], over)
+            found.bounds[:8] = np.maximum(found.bounds[:8], over)
+        parts, skips = [found], is_quick and found.values.max() > TOLERANCE
+        at = terms.values(x, poses)
+        for demand in demands:
+            part = look_at(demand, at)
+            if skips:
+                part.bounds[:] = math.inf
+            else:
+                part = part.merged(prove_demand(demand, x, terms, cells))
+                if part.values.max() <= TOLERANCE < part.bounds.max():
+                    part = part.merged(sample_demand(demand, x, terms, SAMPLES))
+            parts.append(part)
+        found = CellValues(*map(np.concatenate, zip(*parts, strict=True)))
+    lengths = [(LENGTH, f"{end} {leg}") for end in ("longest", "shortest") for leg in LENGTHS]
+    every = [(each.name, item) for each in (*limits, *demands) for item in each.items]
+    names, items = zip(*lengths, *every, strict=True)
+    return Certificate(names, items, own, found.values, found.places, found.bounds <= TOLERANCE)
 
 
 def is_regular(x: FloatArray) -> bool:

@@ -22,13 +22,9 @@ from explorer.find.candidates import candidates, standard_poses
 from explorer.find.certificate import Certificate, certify, is_regular, lengths_over
 from explorer.find.check import check_machine
 from explorer.find.improvement import Improvement, free_variables
-from explorer.find.machine_values import BoxPoses
 from explorer.find.nearest import nearest_values, relaxable_fields
-from explorer.find.over_poses import demand_names
-from explorer.find.over_tilts import limit_names
 from explorer.find.requirement import PREFERENCES, Preference, Requirement
 from explorer.find.terms import Terms, design_of, row_of
-from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.numerics import checks
 from explorer.numerics.arrays import FloatArray
@@ -69,7 +65,7 @@ class Machine:
     certificate: Certificate
     cost: float
     kind: Preference
-    poses: BoxPoses
+    poses: FloatArray
 
 
 @dataclass
@@ -196,10 +192,10 @@ class Search:
         return self._improve(x, kind, first, poses)
 
     def _improve(
-        self, x: FloatArray, kind: Preference, found: Certificate, poses: BoxPoses
+        self, x: FloatArray, kind: Preference, found: Certificate, poses: FloatArray
     ) -> Machine | None:
         for _ in range(ROUNDS):
-            poses = poses.plus(found.worst_poses)
+            poses = np.concatenate([poses, found.worst_poses])
             search = Improvement(self.terms, kind, x, lambda: self.spend(EVALUATION_UNITS))
             improved = search.run(poses)
             x = improved.x
@@ -211,8 +207,8 @@ class Search:
                 is_built = self.terms.parts is None or fits(x, self.terms, found)
                 return Machine(x, found, improved.cost, kind, poses) if is_built else None
             # Legs that cross between the poses stay crossed.
-            crossed = found.missed_demands[: len(PAIRS)] > CROSSED * self.terms.distance
-            if self.terms.distance > 0.0 and crossed.any():
+            crossed = found.missed[found.rows("clearance")] > CROSSED * self.terms.distance
+            if crossed.any():
                 return None
         return None
 
@@ -351,7 +347,7 @@ def _answer(found: Machine, terms: Terms, base: Design | None) -> FoundDesign:
     certificate = found.certificate
     name = f"{terms.requirement.name} {found.kind}"
     design = design_of(found.x, terms, certificate.ranges, name, base)
-    poses = standard_poses(terms.tilt).plus(certificate.limit_poses).plus(certificate.demand_poses)
+    poses = np.concatenate([standard_poses(terms.tilt), certificate.poses])
     at = terms.values(found.x, poses)
     speeds = np.stack(np.broadcast_arrays(*at.tool_speeds))
     held = np.stack(
@@ -383,9 +379,8 @@ BINDING = 5e-3
 def _binding(found: Machine, terms: Terms) -> tuple[str, ...]:
     """Return the names of the demands that bind a machine."""
     certificate = found.certificate
-    names = [*limit_names(terms), *demand_names(terms)]
-    missed = [*certificate.missed_limits.tolist(), *certificate.missed_demands.tolist()]
     ratios = certificate.ranges[:, 1] / certificate.ranges[:, 0]
-    binding = [n for n, each in zip(names[8:], missed[8:], strict=True) if each > -BINDING]
+    rows = zip(certificate.names[8:], certificate.items[8:], certificate.missed[8:], strict=True)
+    binding = [f"{name} {item}".strip() for name, item, each in rows if each > -BINDING]
     legs = zip(LENGTHS, ratios.tolist(), strict=True)
     return (*(f"ratio {n}" for n, each in legs if each > terms.ratio * (1 - BINDING)), *binding)

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from explorer.find import machine_values as m
-from explorer.find.machine_values import HOME, BoxPoses
-from explorer.find.over_tilts import sides_of
+from explorer.find.demands import demands_of, limits_of
 from explorer.find.requirement import Preference
 from explorer.find.terms import ROOM, Parts, Terms, part_slacks
 from explorer.numerics.arrays import FloatArray
@@ -89,81 +88,41 @@ class Improvement:
         start: FloatArray,
         before_each: Callable[[], None] = lambda: None,
     ) -> None:
-        self.terms, self.weights = terms, WEIGHTS[preference]
-        self.start, self.sides = start, sides_of(start, terms)
+        self.terms, self.weights, self.start = terms, WEIGHTS[preference], start
+        self.demands = [*limits_of(terms), *demands_of(terms)]
+        self.sides = terms.values(start, m.HOME).sides
         self.free, self._before_each = free_variables(terms), before_each
         self.extra = [each for each in self.weights if each != LENGTH]
 
-    def table(self, x: Any, poses: BoxPoses, bounds: Any) -> Any:
+    def table(self, x: Any, poses: FloatArray, bounds: Any) -> Any:
         """Return the slacks of machines (n, 18) in poses, shape (n, demands, k).
 
         The bounds, shape (n, 5 + extra), are the shortest length of each leg, the longest of all,
         and the logarithms of what the preference lowers.
         """
         terms = self.terms
-        at, home = terms.values(x, poses), terms.values(x, HOME)
+        at = terms.values(x, poses)
+        # Legs that have crossed are apart by less than nothing, and margins keep their sides.
+        at.distances, at.sides = at.uncrossed_distances, self.sides
         shortest, longest = bounds.T[:4, :, None], bounds.T[4, :, None]
         rows = [length - short for length, short in zip(at.lengths, shortest, strict=True)]
         rows += [longest - length for length in at.lengths]
         if math.isfinite(terms.ratio):
             ratio = terms.ratio * (1.0 - RESERVE)
             rows += [ratio * short - each for each, short in zip(at.lengths, shortest, strict=True)]
-        signed = zip(self.sides, (*at.margins, at.order), strict=True)
-        margins = [side * each for side, each in signed]
-        rows += [each - terms.margin * (1.0 + RESERVE) for each in margins[:3]]
-        rows.append(margins[3] - 0.01)
-        if terms.swing < math.pi:
-            cosine = math.cos(terms.swing) + RESERVE
-            rows += [each - cosine for each in at.swings(home)]
-        if terms.distance > 0.0:
-            rows += [
-                each - terms.distance * (1.0 + 100.0 * RESERVE)
-                for each in at.uncrossed_distances(home)
-            ]
+        for demand in self.demands:
+            rows += [-each - demand.reserve for each in demand.missed(at)]
         if terms.parts is not None:
-            rows += self._parts(terms.parts, home, shortest, at)
-        rows += self._machine(at)
+            rows += self._parts(terms.parts, shortest, at)
         rows += self._preferred(at, bounds.T[5:, :, None])
-        shape = (len(x), len(poses.places))
+        shape = (len(x), len(poses))
         return np.stack([np.broadcast_to(row, shape) for row in rows], axis=1)
 
-    def _parts(
-        self, parts: Parts, home: m.MachineValues, shortest: Any, at: m.MachineValues
-    ) -> list[FloatArray]:
+    def _parts(self, parts: Parts, shortest: Any, at: m.MachineValues) -> list[FloatArray]:
         """Return the slacks of the distances that the parts need at home, and of the strokes."""
-        rows = part_slacks(parts, home)
+        rows = part_slacks(parts, at.home)
         pairs = zip(at.lengths, shortest, (1.0 + ROOM) * parts.dead, strict=True)
         return rows + [2.0 * short - dead - each for each, short, dead in pairs]
-
-    def _machine(self, at: m.MachineValues) -> list[Any]:
-        """Return the slacks of forces, speeds, transmission, error and deflection."""
-        terms, rows = self.terms, list[Any]()
-        keeps = 1.0 - 200.0 * RESERVE
-        if math.isfinite(terms.push) and (terms.force or terms.weight.any()):
-            weight, centre = (tuple(each) for each in (terms.weight, terms.centre))
-            for held, speed in zip(at.weight_forces(weight, centre), at.tool_speeds, strict=True):
-                rows.append(keeps - (held + terms.force * speed) / terms.push)
-                rows.append(keeps - (terms.force * speed - held) / terms.pull)
-        if math.isfinite(terms.speed) and terms.turning:
-            points = [at.ends[0], at.ends[1], at.ends[2], at.ends[3]]
-            for end, leg, length in zip(points, at.legs, at.lengths, strict=True):
-                arm = m.minus(end, at.tool)
-                lever = m.norm(m.cross(arm, m.times(1.0 / length, leg)))
-                rows.append(keeps - (terms.velocity + terms.turning * lever) / terms.speed)
-        if terms.transmission:
-            rows += [each - terms.transmission / keeps for each in at.transmissions]
-        if math.isfinite(terms.error):
-            total = sum(at.tool_speeds)
-            rows.append(keeps - terms.actuator_error * total / terms.error)
-        if math.isfinite(terms.deflection):
-            weight, centre = (tuple(each) for each in (terms.weight, terms.centre))
-            forces = [m.size(each) for each in at.weight_forces(weight, centre)]
-            total = sum(
-                speed * (force + terms.force * speed)
-                for speed, force in zip(at.tool_speeds, forces, strict=True)
-            )
-            rows.append(keeps - terms.flexibility * total / terms.deflection)
-        return rows
 
     def _preferred(self, at: m.MachineValues, bounds: FloatArray) -> list[FloatArray]:
         """Return the slacks of what the preference lowers below their bounds, as logarithms."""
@@ -183,7 +142,7 @@ class Improvement:
                     rows += [bound + np.log(each) for each in at.distances]
         return rows
 
-    def _first_bounds(self, x: FloatArray, poses: BoxPoses) -> FloatArray:
+    def _first_bounds(self, x: FloatArray, poses: FloatArray) -> FloatArray:
         """Return the least bounds that one machine keeps in poses, shape (5 + extra,)."""
         none = np.zeros((1, 5 + len(self.extra)))
         with np.errstate(all="ignore"):
@@ -203,7 +162,7 @@ class Improvement:
             start += count
         return found
 
-    def run(self, poses: BoxPoses, *, rounds: int = 20) -> Improved:
+    def run(self, poses: FloatArray, *, rounds: int = 20) -> Improved:
         """Return the machine after the solver's rounds, and what it still misses at the poses.
 
         A round that neither lowers the cost nor what is missed is taken back, and the next one goes
@@ -233,7 +192,7 @@ class Improvement:
                 break
         return Improved(x, missed, cost)
 
-    def _worst_rows(self, x: FloatArray, poses: BoxPoses, bounds: FloatArray) -> Any:
+    def _worst_rows(self, x: FloatArray, poses: FloatArray, bounds: FloatArray) -> Any:
         """Return pairs of each demand and a pose where it has least to spare, shape (r, 2)."""
         with np.errstate(all="ignore"):
             slacks = self.table(x[None], poses, bounds[None])[0]
@@ -241,7 +200,7 @@ class Improvement:
         return np.column_stack([np.repeat(np.arange(len(slacks)), LOOKS), order.ravel()])
 
     def _step(
-        self, x: FloatArray, bounds: FloatArray, poses: BoxPoses, rows: Any, trusted: float
+        self, x: FloatArray, bounds: FloatArray, poses: FloatArray, rows: Any, trusted: float
     ) -> tuple[FloatArray, FloatArray]:
         """Return a machine and its bounds after one run of the solver, within a trusted change.
 
@@ -249,7 +208,7 @@ class Improvement:
         """
         free, n = self.free, len(self.free)
         used, places = np.unique(rows[:, 1], return_inverse=True)
-        looked = poses.at(used)
+        looked = poses[used]
         steps = 1j * STEP * np.eye(n + len(bounds))
 
         def evaluate(y: FloatArray) -> Point:
@@ -280,7 +239,7 @@ class Improvement:
         moved[free] = y[:n]
         return moved, y[n:]
 
-    def cost(self, poses: BoxPoses) -> float:
+    def cost(self, poses: FloatArray) -> float:
         """Return the cost of the start, with the least bounds that it keeps in poses."""
         return self._cost(self._first_bounds(self.start, poses))
 
@@ -288,7 +247,7 @@ class Improvement:
         weights = [self.weights[kind] for kind in self.extra]
         return self.weights[LENGTH] * math.log(bounds[4]) + float(np.dot(weights, bounds[5:]))
 
-    def missed(self, x: FloatArray, poses: BoxPoses, bounds: FloatArray) -> float:
+    def missed(self, x: FloatArray, poses: FloatArray, bounds: FloatArray) -> float:
         """Return the largest amount by which a demand is missed in poses; 0 if none is."""
         with np.errstate(all="ignore"):
             least = float(np.min(self.table(x[None], poses, bounds[None])))

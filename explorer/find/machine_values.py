@@ -11,12 +11,12 @@ and bound the results over cells of poses.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from explorer.legs.clearance import PAIRS
-from explorer.numerics.affine import Affine
+from explorer.numerics.affine import Affine, largest_norm
 from explorer.numerics.arrays import FloatArray
 
 Vec = tuple[Any, Any, Any]
@@ -37,28 +37,18 @@ A3X, A3Y, B1X, B1Y, B2, B3, HX, HY, HZ, BOX_YAW, YAW, PITCH, ROLL, TX, TY, TZ, T
     len(VARIABLES)
 )
 
+SWINGING = (0, 3, 0, 1, 2, 3)
+"""The legs, from 0, whose swings are bounded at a1, a3, b1, b2, b3 and b4."""
 
-class BoxPoses(NamedTuple):
-    """Poses over a required box.
-
-    Attributes:
-        places: Places in the box, from −1 to 1 along each of its edges, shape (k, 3).
-        tilts: Vectors of the turns in the base plane, in radians, shape (k, 2).
-    """
-
-    places: FloatArray
-    tilts: FloatArray
-
-    def plus(self, other: BoxPoses) -> BoxPoses:
-        """Return the poses of both."""
-        return BoxPoses(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
-
-    def at(self, rows: Any) -> BoxPoses:
-        """Return some of the poses."""
-        return BoxPoses(self.places[rows], self.tilts[rows])
+POINTS = (0, 1, 1, 2, 2, 3)
+"""The points b1 to b4, from 0, that the six actuators move."""
 
 
-HOME = BoxPoses(np.zeros((1, 3)), np.zeros((1, 2)))
+HOME = np.zeros((1, 5))
+"""The pose at home.
+
+Poses over a required box are rows of five numbers: places in the box, from −1 to 1 along each of
+its edges, and the azimuth of the axis and the angle of a tilt, in radians."""
 
 
 def plus(a: Vec, b: Vec) -> Vec:
@@ -92,10 +82,27 @@ def norm(a: Vec) -> Any:
     return square.root() if isinstance(square, Affine) else np.sqrt(square)
 
 
+def longest(a: Vec) -> Any:
+    """Return |a|, or the upper bound of it over cells."""
+    return largest_norm(*a) if isinstance(a[0], Affine) else norm(a)
+
+
+def most(value: Any) -> Any:
+    """Return a value, or the upper bound of it over cells."""
+    return value.upper if isinstance(value, Affine) else value
+
+
 def size(value: Any) -> Any:
-    """Return |value|, analytic where it is not zero."""
+    """Return |value|, analytic where it is not zero, or the upper bound of it over cells."""
+    if isinstance(value, Affine):
+        return np.maximum(value.upper, -value.lower)
     sign: FloatArray = np.where(np.real(value) < 0.0, -1.0, 1.0)
     return sign * value
+
+
+def rows_of(vector: Vec) -> FloatArray:
+    """Return a vector of arrays (...) as rows, shape (..., 3)."""
+    return np.stack(np.broadcast_arrays(*vector), axis=-1)
 
 
 class MachineValues:
@@ -104,18 +111,17 @@ class MachineValues:
     The edges of the box (3,) are over its diagonal, as all lengths are.
     """
 
-    def __init__(self, machines: Any, edges: FloatArray, poses: BoxPoses) -> None:
-        self.poses, self.edges = poses, edges
+    def __init__(self, machines: Any, edges: FloatArray, poses: FloatArray) -> None:
+        self.machines, self.edges, self.poses = machines, edges, poses
         x: list[Any] = [column[..., None] for column in np.moveaxis(machines, -1, 0)]
         self.x = x
-        along = (0.5 * edges * poses.places).T
+        along = (0.5 * edges * poses[:, :3]).T
         c, s = np.cos(x[BOX_YAW]), np.sin(x[BOX_YAW])
         offset: Vec = along[0] * c - along[1] * s, along[0] * s + along[1] * c, along[2]
         self.tool = plus((x[HX], x[HY], x[HZ]), times(x[SIZE], offset))
-        size = np.sqrt((poses.tilts**2).sum(axis=-1))
-        azimuth = np.divide(poses.tilts.T, size, out=np.zeros_like(poses.tilts.T), where=size > 0.0)
-        self._axis: Vec = azimuth[0], azimuth[1], 0.0
-        self._cos, self._sin = np.cos(x[TILT] * size), np.sin(x[TILT] * size)
+        azimuth, tilt = poses[:, 3], x[TILT] * poses[:, 4]
+        self._axis: Vec = np.cos(azimuth), np.sin(azimuth), 0.0
+        self._cos, self._sin = np.cos(tilt), np.sin(tilt)
         self.home_axes = _axes(x)
         self.u, self.v, self.w = map(self._tilted, self.home_axes)
         self.p = minus(self.tool, self.of_platform((x[TX], x[TY], x[TZ])))
@@ -137,6 +143,13 @@ class MachineValues:
         x, p = self.x, self.p
         b1 = plus(p, plus(times(x[B1X], self.u), times(x[B1Y], self.v)))
         return [b1, plus(p, times(x[B2], self.u)), plus(p, times(x[B3], self.u)), p]
+
+    @cached_property
+    def bases(self) -> list[Vec]:
+        """Base ends of the four legs."""
+        _, b2, b3, _ = self.ends
+        a3 = self.x[A3X], self.x[A3Y], 0.0
+        return [(0.0, 0.0, 0.0), (b2[0], 0.0, 0.0), (b3[0], 0.0, 0.0), a3]
 
     @cached_property
     def legs(self) -> list[Vec]:
@@ -162,41 +175,59 @@ class MachineValues:
         """The distance d3 − d1 of the carriages with its sign."""
         return (self.x[B3] - self.x[B2]) * self.u[0]
 
-    def swings(self, home: MachineValues) -> list[Any]:
-        """Return the cosines of the legs' angles from home in the joints a1, a3, b1 to b4."""
-        found = [dot(self.legs[i], home.legs[i]) for i in (0, 3)]
-        norms = [self.lengths[i] * home.lengths[i] for i in range(4)]
-        cosines = [found[0] / norms[0], found[1] / norms[3]]
-        axes, own = (self.u, self.v, self.w), self.home_axes
-        for leg, at_home, size in zip(self.legs, home.legs, norms, strict=True):
-            parts = [
-                dot(axis, leg) * dot(mine, at_home) for axis, mine in zip(axes, own, strict=True)
-            ]
-            cosines.append((parts[0] + parts[1] + parts[2]) / size)
-        return cosines
+    @cached_property
+    def home(self) -> MachineValues:
+        """The machines at home."""
+        return MachineValues(self.machines, self.edges, HOME)
+
+    @cached_property
+    def sides(self) -> list[Any]:
+        """The signs of δ1, δ2, δ3 and of d3 − d1 at home."""
+        signed: list[Any] = [*self.home.margins, self.home.order]
+        return [np.sign(each.real) for each in signed]
+
+    @cached_property
+    def along_home(self) -> list[Any]:
+        """The parts of the legs along those at home, seen from the joints a1, a3, b1 to b4."""
+        home = self.home
+        units = [
+            times(1.0 / length, leg) for leg, length in zip(home.legs, home.lengths, strict=True)
+        ]
+        found = [dot(self.legs[i], units[i]) for i in (0, 3)]
+        axes = [*zip((self.u, self.v, self.w), self.home_axes, strict=True)]
+        for leg, unit in zip(self.legs, units, strict=True):
+            x, y, z = (dot(axis, leg) * dot(at_home, unit) for axis, at_home in axes)
+            found.append(x + y + z)
+        return found
+
+    @cached_property
+    def swings(self) -> list[Any]:
+        """The cosines of the legs' angles from home in the joints a1, a3, b1 to b4."""
+        lengths = [self.lengths[i] for i in SWINGING]
+        return [part / length for part, length in zip(self.along_home, lengths, strict=True)]
 
     @cached_property
     def distances(self) -> list[Any]:
         """The distances of the axes of the six pairs of legs, in the order of `PAIRS`."""
         return [distance for distance, _ in self._closest]
 
-    def uncrossed_distances(self, home: MachineValues) -> list[Any]:
-        """Return the distances of the pairs, negative where two legs have crossed.
+    @property
+    def uncrossed_distances(self) -> list[Any]:
+        """The distances of the pairs, negative where two legs have crossed.
 
         They have if they pass each other on the other side than at home.
         """
         return [
             np.where(side * at_home < 0.0, -distance, distance)
-            for (distance, side), (_, at_home) in zip(self._closest, home._closest, strict=True)
+            for (distance, side), (_, at_home) in zip(
+                self._closest, self.home._closest, strict=True
+            )
         ]
 
     @cached_property
     def _closest(self) -> list[tuple[Any, FloatArray]]:
-        base = [minus(end, leg) for end, leg in zip(self.ends, self.legs, strict=True)]
-        return [
-            _distance(base[i - 1], self.legs[i - 1], base[j - 1], self.legs[j - 1])
-            for i, j in PAIRS
-        ]
+        legs = [*zip(self.bases, self.legs, strict=True)]
+        return [_distance(*legs[i - 1], *legs[j - 1]) for i, j in PAIRS]
 
     def forces(self, force: Vec, moment: Vec) -> list[Any]:
         """Return the actuators' forces that hold a wrench about b4, in the order of the joints.
@@ -242,21 +273,17 @@ class MachineValues:
     @cached_property
     def tool_speeds(self) -> list[Any]:
         """Speed of the tool for a unit rate of each actuator, its force for 1 N at the tool."""
-        return [norm(velocity) for velocity in self.velocities]
+        return [longest(velocity) for velocity in self.velocities]
 
     @cached_property
     def transmissions(self) -> list[Any]:
-        """The output transmission indices of the six actuators."""
-        return [1.0 / norm(velocity) for velocity in self.own_velocities]
-
-    @cached_property
-    def own_velocities(self) -> list[Vec]:
-        """The velocity of each actuator's point of the platform for its unit rate."""
-        joints = [self.ends[0], self.ends[1], self.ends[1], self.ends[2], self.ends[2], self.p]
-        return [
-            plus(velocity, cross(turning, minus(joint, self.tool)))
-            for velocity, turning, joint in zip(self.velocities, self.turnings, joints, strict=True)
-        ]
+        """The output transmission indices of the six actuators, or lower bounds over cells."""
+        moves = zip(self.velocities, self.turnings, POINTS, strict=True)
+        own = (
+            plus(velocity, cross(turning, minus(self.ends[point], self.tool)))
+            for velocity, turning, point in moves
+        )
+        return [1.0 / longest(each) for each in own]
 
 
 UNITS: list[Vec] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]

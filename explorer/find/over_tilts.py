@@ -2,14 +2,13 @@
 
 At one orientation closed forms tell the worst position of the box: a longest length is convex in
 the position, so that its maximum is at a corner, and so is how far a leg is within a cone of less
-than a right angle; a shortest length is the distance of the box from a point or a line; the margins
-are linear.
+than a right angle; the margins are linear; a leg is shortest at one nearest place.
 
 Over a cell of azimuths and tilts a vector R v of the platform is within e |v| of a convex
 combination of its values at the four corners, with e of the order of the square of the cell. A
 slack that is concave in such vectors is at least the least one of the corners, less e times its
-rate. That of a shortest length is not: for it the half-space behind a plane that touches the box
-stands for the box, since the distance from that is linear and no greater.
+rate. That of a shortest length is not: for it the part of the leg along one direction stands for
+the length, since that is linear and no greater.
 """
 
 from __future__ import annotations
@@ -20,191 +19,107 @@ import math
 import numpy as np
 
 from explorer.find import machine_values as m
-from explorer.find.machine_values import HOME, BoxPoses
+from explorer.find.demands import limits_of
 from explorer.find.terms import Terms
-from explorer.mechanism.design import LENGTHS
-from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.numerics.arrays import FloatArray, dot, lengths_of
 from explorer.numerics.cells import CellValues, corners_of_cells, largest_values
 
 CORNERS = np.array([*itertools.product((-1.0, 1.0), repeat=3)])
 """The corners of the box as places, shape (8, 3)."""
 
-SWINGS = ("a1", "a3", "b1", "b2", "b3", "b4")
-"""The joints whose swing is bounded, in the order of `MachineValues.swings`."""
-
 # Cells of azimuths and tilts that a proof may take.
 MOST_CELLS = 12_000
 
 
-def sides_of(x: FloatArray, terms: Terms) -> FloatArray:
-    """Return the signs of δ1, δ2, δ3 and of d3 − d1 at home, shape (4,)."""
-    at = terms.values(x, HOME)
-    return np.sign([float(np.squeeze(each)) for each in (*at.margins, at.order)])
-
-
-def limit_names(terms: Terms) -> list[str]:
-    """Return the names of the limits that are proven here, in their order."""
-    names = [*(f"longest {name}" for name in LENGTHS), *(f"shortest {name}" for name in LENGTHS)]
-    names += [*(f"margin δ{i}" for i in (1, 2, 3)), "carriage order"]
-    return names + [f"swing {joint}" for joint in SWINGS if terms.swing < math.pi]
+def poses_over(places: FloatArray, tilts: FloatArray) -> FloatArray:
+    """Return all poses of places (p, 3) at azimuths and tilts (k, 2), shape (k p, 5)."""
+    count = len(places)
+    return np.column_stack([np.tile(places, (len(tilts), 1)), np.repeat(tilts, count, axis=0)])
 
 
 def prove_limits(x: FloatArray, terms: Terms, ranges: FloatArray) -> CellValues:
     """Return by how much each limit is missed at most over all poses, over the box's diagonal.
 
-    The order is that of `limit_names`; a place is an azimuth and a tilt, at which `worst_place`
-    returns the worst position. Swings count by the distance of a leg's end from its cone.
+    Longest and shortest lengths of the four legs come first, then the `limits_of` the requirement;
+    places are poses.
 
     Args:
         x: The machine.
         terms: The requirement.
         ranges: Shortest and longest length of each leg, shape (4, 2).
     """
-    over = _OverTilts(x, terms, ranges)
+    limits, rates = limits_of(terms), _rates(x, terms)
+
+    def over_corners(tilts: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the amounts missed at tilts (n, 2) in the corners, (n, 8, limits), and legs."""
+        at = terms.values(x, poses_over(CORNERS, tilts))
+        lengths = np.stack(at.lengths, axis=1)
+        shortest = ranges[:, 0] - lengths_of(_nearest(x, terms, tilts)[1])
+        rows = [lengths - ranges[:, 1], np.repeat(shortest, 8, axis=0)]
+        found = np.concatenate([*rows, *(each.missed_rows(at) for each in limits)], axis=1)
+        return found.reshape(len(tilts), 8, -1), _legs(at).reshape(len(tilts), 8, 4, 3)
 
     def measure(lows: FloatArray, highs: FloatArray) -> CellValues:
-        places = corners_of_cells(lows, highs)
+        n, corners = len(lows), corners_of_cells(lows, highs)
         azimuths, tilts = (highs - lows).T
         # Second derivatives of R v by the tilt are at most |v|, by the azimuth |v| times this.
         turning = np.sin(highs[:, 1]) + 2.0 * (1.0 - np.cos(highs[:, 1]))
         error = 0.125 * (tilts**2 + azimuths**2 * turning)
-        slacks = over.slacks(places.reshape(-1, 2)).min(axis=-1).reshape(len(lows), 4, -1)
-        worst, least = slacks.argmin(axis=1), slacks.min(axis=1)
-        bounds = least.copy()
-        bounds[:, 4:8] = over.bound_shortest(places)
-        bounds -= error[:, None] * over.rates
-        return CellValues(-least, places[np.arange(len(lows))[:, None], worst], -bounds)
+        found, legs = over_corners(corners.reshape(-1, 2))
+        missed = found.max(axis=1).reshape(n, 4, -1)
+        worst, most = missed.argmax(axis=1), missed.max(axis=1)
+        # The direction of the shortest leg in the middle of the cell.
+        normal = _nearest(x, terms, corners.mean(axis=1))[1]
+        normal = normal / np.maximum(lengths_of(normal), 1e-300)[..., None]
+        parts = dot(legs.reshape(n, 32, 4, 3), normal[:, None]).min(axis=1)
+        bounds = most.copy()
+        bounds[:, 4:8] = ranges[:, 0] - np.maximum(parts, 0.0)
+        bounds += error[:, None] * rates
+        return CellValues(most, corners[np.arange(n)[:, None], worst], bounds)
 
     ends = np.array([-math.pi, 0.0]), np.array([math.pi, terms.tilt])
-    return largest_values(measure, *ends, most=MOST_CELLS)
+    found = largest_values(measure, *ends, most=MOST_CELLS)
+    every = np.arange(len(found.values))
+    places = CORNERS[over_corners(found.places)[0][every, :, every].argmax(axis=1)]
+    places[4:8] = _nearest(x, terms, found.places[4:8])[0][every[:4], every[:4]]
+    return found._replace(places=np.column_stack([places, found.places]))
 
 
-def worst_place(
-    x: FloatArray, terms: Terms, ranges: FloatArray, index: int, place: FloatArray
-) -> BoxPoses:
-    """Return the pose at an azimuth and a tilt that misses a limit most, of one row."""
-    over = _OverTilts(x, terms, ranges)
-    corner = int(over.slacks(place[None])[0, index].argmin())
-    nearest = over.nearest_places(place[None])[0]
-    places = nearest[index - 4] if 4 <= index < 8 else CORNERS[corner]
-    return BoxPoses(places[None], tilt_vectors(place[None]))
+def _rates(x: FloatArray, terms: Terms) -> FloatArray:
+    """Return how fast each limit is missed by the errors e of interpolated vectors."""
+    tool = x[m.TX : m.TILT]
+    b = np.zeros((4, 3))
+    b[0, :2], b[1, 0], b[2, 0] = x[m.B1X : m.B2], x[m.B2], x[m.B3]
+    arms, half = lengths_of(b - tool), 0.5 * x[m.SIZE] * terms.edges
+    farthest = float(lengths_of(np.abs(x[m.HX : m.BOX_YAW]) + math.hypot(*half)))
+    rates = [*arms, *arms, farthest, farthest + math.hypot(tool[1], tool[2])]
+    rates += [float(lengths_of(tool)), abs(float(x[m.B3] - x[m.B2]))]
+    if terms.swing < math.pi:
+        cosine, base = math.cos(terms.swing), farthest + math.hypot(*x[:2])
+        rates += [(1.0 + cosine) * arms[0], (1.0 + cosine) * arms[3]]
+        # For legs 2 and 3 a product of two turning vectors is interpolated.
+        rates += [base + cosine * arms[0], *(farthest + (4.0 + cosine) * arms[1:3])]
+        rates += [base + cosine * arms[3]]
+    return np.array(rates)
 
 
-def tilt_vectors(places: FloatArray) -> FloatArray:
-    """Return the vectors of turns of azimuths and tilts (..., 2)."""
-    azimuth, tilt = places[..., 0], places[..., 1]
-    return np.stack([tilt * np.cos(azimuth), tilt * np.sin(azimuth)], axis=-1)
+def _nearest(x: FloatArray, terms: Terms, tilts: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the places at which each leg is shortest at tilts (n, 2), and the legs, (n, 4, 3).
+
+    Each edge of the box moves a leg along a line. These lines are at right angles to each other, or
+    parallel for legs 2 and 3, so that the nearest place is found along one after another.
+    """
+    poses = poses_over(np.eye(4, 3, -1), tilts)
+    moved = _legs(terms.values(x, poses)).reshape(len(tilts), 4, 4, 3)
+    legs, places = moved[:, 0].copy(), np.zeros((len(tilts), 4, 3))
+    for axis in range(3):
+        edge = moved[:, 1 + axis] - moved[:, 0]
+        share = -dot(legs, edge) / np.maximum(dot(edge, edge), 1e-300)
+        places[..., axis] = np.clip(share, -1.0, 1.0)
+        legs += places[..., axis, None] * edge
+    return places, legs
 
 
-class _OverTilts:
-    """The slacks of the limits of one machine at orientations, over the whole box."""
-
-    def __init__(self, x: FloatArray, terms: Terms, ranges: FloatArray) -> None:
-        self.x, self.terms, self.ranges = x, terms, ranges
-        self.home, self.sides = terms.values(x, HOME), sides_of(x, terms)
-        tool = x[m.TX : m.TILT]
-        b = np.zeros((4, 3))
-        b[0, :2], b[1, 0], b[2, 0] = x[m.B1X : m.B2], x[m.B2], x[m.B3]
-        self.arms = b - tool
-        arms, half = lengths_of(self.arms), 0.5 * x[m.SIZE] * terms.edges
-        farthest = float(lengths_of(np.abs(x[m.HX : m.BOX_YAW]) + math.hypot(*half)))
-        span = abs(float(x[m.B3] - x[m.B2]))
-        rates = [*arms, *arms, farthest, farthest + math.hypot(tool[1], tool[2])]
-        rates += [float(lengths_of(tool)), span]
-        if terms.swing < math.pi:
-            cosine, base = math.cos(terms.swing), farthest + math.hypot(*x[:2])
-            rates += [(1.0 + cosine) * arms[0], (1.0 + cosine) * arms[3]]
-            # For legs 2 and 3 a product of two turning vectors is interpolated.
-            rates += [base + cosine * arms[0], *(farthest + (4.0 + cosine) * arms[1:3])]
-            rates += [base + cosine * arms[3]]
-        self.rates: FloatArray = np.array(rates)
-
-    def slacks(self, tilts: FloatArray) -> FloatArray:
-        """Return the slacks at azimuths and tilts (n, 2) in the corners, shape (n, limits, 8).
-
-        Those of shortest lengths are the same in all corners.
-        """
-        n = len(tilts)
-        vectors = np.repeat(tilt_vectors(tilts), 8, axis=0)
-        at = self.terms.values(self.x, BoxPoses(np.tile(CORNERS, (n, 1)), vectors))
-        rows = [high - length for length, high in zip(at.lengths, self.ranges[:, 1], strict=True)]
-        rows += [*np.repeat(self._shortest(tilts).T, 8, axis=1)]
-        signed = zip(self.sides, (*at.margins, at.order), strict=True)
-        rows += [side * value for side, value in signed]
-        for index in (8, 9, 10):
-            rows[index] = rows[index] - self.terms.margin
-        if self.terms.swing < math.pi:
-            legs = [at.lengths[i] for i in (0, 3, 0, 1, 2, 3)]
-            cosine = math.cos(self.terms.swing)
-            swings = zip(at.swings(self.home), legs, strict=True)
-            rows += [(value - cosine) * length for value, length in swings]
-        table = np.stack([np.broadcast_to(row, (8 * n,)) for row in rows], axis=-1)
-        return np.swapaxes(table.reshape(n, 8, -1), 1, 2)
-
-    def _apexes(self, tilts: FloatArray) -> FloatArray:
-        """Return the points from which lengths to the tool are those of the legs, (..., 4, 3).
-
-        They are relative to the centre of the box, in the frame of the box, or for legs 2 and 3 of
-        the base.
-        """
-        flat = tilts.reshape(-1, 2)
-        rotation = self.terms.tool_at(
-            self.x, BoxPoses(np.zeros((len(flat), 3)), tilt_vectors(flat))
-        )[1]
-        base = np.zeros((4, 3))
-        base[3, :2] = self.x[:2]
-        found = base - np.einsum("nij,lj->nli", rotation, self.arms) - self.x[m.HX : m.BOX_YAW]
-        c, s = math.cos(self.x[m.BOX_YAW]), math.sin(self.x[m.BOX_YAW])
-        turned = found[:, [0, 3]]
-        found[:, 0::3] = np.stack(
-            [
-                c * turned[..., 0] + s * turned[..., 1],
-                c * turned[..., 1] - s * turned[..., 0],
-                turned[..., 2],
-            ],
-            axis=-1,
-        )
-        found[:, 1:3, 0] = 0.0
-        return found.reshape(*tilts.shape[:-1], 4, 3)
-
-    @property
-    def _halves(self) -> FloatArray:
-        """Half the edges of the box, and of its shadow along the guide, shape (4, 3)."""
-        half = 0.5 * self.x[m.SIZE] * self.terms.edges
-        c, s = abs(math.cos(self.x[m.BOX_YAW])), abs(math.sin(self.x[m.BOX_YAW]))
-        shadow = np.array([0.0, s * half[0] + c * half[1], half[2]])
-        return np.array([half, shadow, shadow, half])
-
-    def _shortest(self, tilts: FloatArray) -> FloatArray:
-        apexes, half = self._apexes(tilts), self._halves
-        return lengths_of(apexes - np.clip(apexes, -half, half)) - self.ranges[:, 0]
-
-    def bound_shortest(self, places: FloatArray) -> FloatArray:
-        """Return lower bounds of the slacks of shortest lengths over cells, shape (n, 4).
-
-        The cells are given by their corners, (n, 4, 2).
-        """
-        apexes, half = self._apexes(places), self._halves
-        middle = apexes.mean(axis=1)
-        outwards = middle - np.clip(middle, -half, half)
-        normal = outwards / np.maximum(lengths_of(outwards), 1e-300)[..., None]
-        farthest = (np.abs(normal) * half).sum(axis=-1)
-        nearest = (apexes * normal[:, None]).sum(axis=-1).min(axis=1) - farthest
-        return np.maximum(nearest, 0.0) - self.ranges[:, 0]
-
-    def nearest_places(self, tilts: FloatArray) -> FloatArray:
-        """Return the places of the box nearest to the legs' base ends, shape (n, 4, 3)."""
-        apexes, half = self._apexes(tilts), 0.5 * self.x[m.SIZE] * self.terms.edges
-        c, s = math.cos(self.x[m.BOX_YAW]), math.sin(self.x[m.BOX_YAW])
-        # The line of the guide lies along x of the base: the nearest corner of the box in y.
-        toward = np.sign(apexes[:, 1:3, 1])
-        shadow = self._halves[1]
-        y, z = np.clip(apexes[:, 1:3, 1], -shadow[1], shadow[1]), apexes[:, 1:3, 2]
-        share = np.where(np.abs(y) < shadow[1], y / shadow[1], toward)
-        ends = [
-            share * np.sign(s or 1.0),
-            share * np.sign(c or 1.0),
-            np.clip(z / half[2], -1.0, 1.0),
-        ]
-        apexes[:, 1:3] = np.stack(ends, axis=-1) * half
-        return np.clip(apexes / half, -1.0, 1.0)
+def _legs(at: m.MachineValues) -> FloatArray:
+    """Return the four legs of one machine in k poses, shape (k, 4, 3)."""
+    return np.stack([m.rows_of(leg) for leg in at.legs], axis=1)

@@ -170,16 +170,15 @@ class Terms:
             parts=Parts.of(legs.diameter_mm, scale) if requirement.buildable else None,
         )
 
-    def values(self, x: Any, poses: m.BoxPoses) -> MachineValues:
+    def values(self, x: Any, poses: FloatArray) -> MachineValues:
         """Return the values of machines (..., n) in poses over the box."""
         return MachineValues(x, self.edges, poses)
 
-    def tool_at(self, x: FloatArray, poses: m.BoxPoses) -> tuple[FloatArray, FloatArray]:
+    def tool_at(self, x: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return tool positions (k, 3), in mm, and rotations (k, 3, 3) of one machine in poses."""
         at = self.values(x, poses)
-        columns = [np.stack(np.broadcast_arrays(*each), axis=-1) for each in (at.u, at.v, at.w)]
-        tool = np.stack(np.broadcast_arrays(*at.tool), axis=-1)
-        return self.scale_mm * tool, np.stack(columns, axis=-1)
+        columns = [m.rows_of(axis) for axis in (at.u, at.v, at.w)]
+        return self.scale_mm * m.rows_of(at.tool), np.stack(columns, axis=-1)
 
 
 def row_of(design: Design, terms: Terms) -> FloatArray:

@@ -34,6 +34,15 @@ class CellValues(NamedTuple):
     places: FloatArray
     bounds: FloatArray
 
+    def merged(self, other: CellValues) -> CellValues:
+        """Return the larger values with their places, and the larger bounds, of two boxes."""
+        is_less = self.values < other.values
+        return CellValues(
+            np.where(is_less, other.values, self.values),
+            np.where(is_less[..., None], other.places, self.places),
+            np.maximum(self.bounds, other.bounds),
+        )
+
 
 def corners_of_cells(lows: FloatArray, highs: FloatArray) -> FloatArray:
     """Return the corners of n cells given by their lows and highs (n, k), shape (n, 2^k, k)."""
@@ -83,17 +92,16 @@ def largest_values(
         cells = CellValues(*map(np.concatenate, zip(*measured, strict=True)))
         rows = cells.values.argmax(axis=0)
         columns = np.arange(len(rows))
-        best, places = cells.values[rows, columns], cells.places[rows, columns]
-        if found is not None:
-            is_old = found.values >= best
-            best = np.where(is_old, found.values, best)
-            places = np.where(is_old[:, None], found.places, places)
+        none = np.full(len(rows), -np.inf)
+        worst = CellValues(cells.values[rows, columns], cells.places[rows, columns], none)
+        worst = worst if found is None else found.merged(worst)
+        best = worst.values
         least = enough + (1.0 + LOOSE) * np.maximum(best - enough, 0.0)
         if not resolves:
             least[best > enough] = np.inf
         divides, left = np.any(cells.bounds > least, axis=1), left - len(low)
         divides &= size.any() and len(halves) * np.count_nonzero(divides) <= left
         bounds = np.where(divides[:, None], -np.inf, cells.bounds).max(axis=0)
-        bounds = bounds if found is None else np.maximum(found.bounds, bounds)
-        found, low = CellValues(best, places, np.maximum(bounds, best)), low[divides]
+        bounds = np.maximum(worst.bounds, bounds)
+        found, low = worst._replace(bounds=np.maximum(bounds, best)), low[divides]
     return found

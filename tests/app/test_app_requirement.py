@@ -57,12 +57,13 @@ FOUND = msgspec.structs.replace(
     required_yaw=30.0,
 )
 WORST = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-70.0, 5.0, 10.0))
-KEPT = DemandCheck("ratio of l1", True, 1.77, 1.8, 0.03, "", WORST, True)
+KEPT = DemandCheck("ratio", "l1", True, 1.77, 1.8, 0.03, "", WORST, True)
 CLEAR = DemandCheck(
-    "clearance of legs 1–4", True, 6.2, 5.0, 1.2, "mm", WORST, False, "no violation in 50000 poses"
+    *("clearance", "legs 1–4", True, 6.2, 5.0, 1.2, "mm", WORST, False),
+    "no violation in 50000 poses",
 )
-MISSED = DemandCheck("swing at b1", False, 47.3, 45.0, -2.3, "°", WORST, False)
-BUILT = DemandCheck("buildable", False, 0.0, 0.0, 0.0, "", None, False, "carriages meet")
+MISSED = DemandCheck("swing", "b1", False, 47.3, 45.0, -2.3, "°", WORST, False)
+BUILT = DemandCheck("buildable", "", False, 0.0, 0.0, 0.0, "", None, False, "carriages meet")
 
 
 def answer(design: Design = FOUND, kind: str = "balanced", **more: Any) -> FoundDesign:
@@ -275,6 +276,7 @@ def test_checklist_says_what_is_missed_by_how_much_and_a_press_goes_there(
     content = checklist(Frame(desk.state))
     for text in (
         "2 of 4 demands missed",
+        "Clearance (legs 1–4)",
         "1.77 ≤ 1.8",
         "6.2 ≥ 5 mm",
         "No violation in 50000 poses.",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import signal
 from pathlib import Path
 from typing import Any
@@ -78,19 +79,19 @@ def test_check_tells_the_worst_pose_of_each_demand(cli: CommandLine, tmp_path: P
     assert all(set(each) == DEMAND for each in check["demands"])
     of = {each["name"]: each for each in check["demands"]}
     assert not all(each["kept"] for each in check["demands"])
-    longest = next(each for name, each in of.items() if name.startswith(("longest", "shortest")))
-    joint = longest["name"].split()[-1]
+    length = of["length"]
     pose = (
-        np.array(longest["position_mm"]) / design.unit_mm,
-        rotation_from_quaternion(longest["quaternion"]),
+        np.array(length["position_mm"]) / design.unit_mm,
+        rotation_from_quaternion(length["quaternion"]),
     )
     joints = dict(zip(explorer.JOINTS, explorer.inverse(design, *pose), strict=True))
-    assert design.unit_mm * joints[joint] == pytest.approx(longest["worst"])
-    index = next(each for name, each in of.items() if name.startswith("transmission"))
+    index = of["transmission index"]
     assert index["spare"] == pytest.approx(index["worst"] - index["limit"])
     out, err = cli.run("check", "--design", "paper-optimal", "--requirement", need, status=1)
     assert "missed" in out
-    assert longest["name"] in out
+    end, joint = re.findall(r"length \((longest|shortest) (..)\)", out)[0]
+    assert (end == "longest") == (length["spare"] == length["limit"] - length["worst"])
+    assert design.unit_mm * joints[joint] == pytest.approx(length["worst"])
     assert err.startswith("explorer: the design misses ")
 
 

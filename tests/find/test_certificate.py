@@ -11,16 +11,11 @@ import pytest
 from explorer import Configuration, Design, Tool, inverse, leg_clearances, margins
 from explorer.find import machine_values as m
 from explorer.find.certificate import certify
+from explorer.find.demands import demands_of, limits_of
 from explorer.find.improvement import STEP, Improvement
-from explorer.find.machine_values import HOME, BoxPoses, MachineValues
-from explorer.find.over_poses import (
-    ends_of,
-    missed_amounts,
-    poses_of,
-    prove_demands,
-    sample_demands,
-)
-from explorer.find.over_tilts import limit_names, prove_limits, sides_of, tilt_vectors, worst_place
+from explorer.find.machine_values import HOME
+from explorer.find.over_poses import ends_of, prove_demand, sample_demand
+from explorer.find.over_tilts import prove_limits
 from explorer.find.requirement import (
     RequiredLegs,
     RequiredLoad,
@@ -65,8 +60,8 @@ def random_machine(random: np.random.Generator, *, tool: bool) -> FloatArray:
     return x
 
 
-def random_places(random: np.random.Generator, terms: Terms, count: int) -> FloatArray:
-    """Return coordinates of poses, a part of them at the ends of their ranges, shape (n, 5)."""
+def random_poses(random: np.random.Generator, terms: Terms, count: int) -> FloatArray:
+    """Return poses over the box, a part of them at the ends of their ranges, shape (n, 5)."""
     lows, highs = ends_of(terms)
     places = random.uniform(lows, highs, (count, 5))
     at_ends = random.random(places.shape) < 0.3
@@ -78,7 +73,7 @@ def test_machine_values_are_those_of_configurations(seed: int) -> None:
     random = np.random.default_rng(seed)
     terms = Terms.of(EVERYTHING)
     x = random_machine(random, tool=seed % 2 == 0)
-    at = terms.values(x, poses_of(random_places(random, terms, 20)))
+    at = terms.values(x, random_poses(random, terms, 20))
     design = Design(
         a3=(x[0], x[1]), b1=(x[2], x[3]), b2=x[4], b3=x[5], tool=Tool(tuple(x[m.TX : m.TILT]))
     )
@@ -105,12 +100,12 @@ def test_machine_values_with_an_imaginary_step_are_derivatives() -> None:
     random = np.random.default_rng(3)
     terms = Terms.of(EVERYTHING)
     x = random_machine(random, tool=True)
-    poses = poses_of(random_places(random, terms, 5))
+    poses = random_poses(random, terms, 5)
 
     def values(machine: Any) -> Any:
         at = terms.values(machine, poses)
         rows = [*at.lengths, *at.margins, *at.distances, *at.tool_speeds, *at.transmissions]
-        rows += at.swings(terms.values(machine, HOME))
+        rows += [*at.swings, *at.along_home]
         return np.stack([np.broadcast_to(row, (5,)) for row in rows])
 
     for index in range(len(x)):
@@ -126,29 +121,31 @@ def test_limits_over_tilts_exceed_no_bound_and_are_attained(seed: int) -> None:
     random = np.random.default_rng(seed)
     terms = Terms.of(EVERYTHING)
     x = random_machine(random, tool=seed % 2 == 0)
-    poses = poses_of(random_places(random, terms, 4000))
-    at, home = terms.values(x, poses), terms.values(x, HOME)
+    poses = random_poses(random, terms, 4000)
+    at = terms.values(x, poses)
     lengths = np.array(at.lengths)
     ranges = np.column_stack([lengths.min(axis=1), lengths.max(axis=1)])
     found = prove_limits(x, terms, ranges)
-    sides = sides_of(x, terms)
     legs = np.array([at.lengths[i] for i in (0, 3, 0, 1, 2, 3)])
     missed = [*(lengths - ranges[:, 1:]), *(ranges[:, :1] - lengths)]
+    sides = np.ravel(at.sides)
     missed += [terms.margin - side * each for side, each in zip(sides, at.margins, strict=False)]
     missed.append(-sides[3] * np.broadcast_to(at.order, lengths[0].shape))
-    missed += [*((math.cos(terms.swing) - np.array(at.swings(home))) * legs)]
+    missed += [*((math.cos(terms.swing) - np.array(at.swings)) * legs)]
     largest = np.array([each.max() for each in missed])
     assert (largest <= found.bounds + 1e-12).all()
     assert (found.values <= found.bounds + 1e-12).all()
     # What is missed is known well, with the pose where.
     over = found.values > 0.0
     assert found.bounds[over] == pytest.approx(found.values[over], rel=2e-3, abs=1e-9)
+    worst = terms.values(x, found.places)
+    over_poses = np.array(worst.lengths).T
     for index in range(8):
-        worst = terms.values(x, worst_place(x, terms, ranges, index, found.places[index]))
-        length = float(np.squeeze(worst.lengths[index % 4]))
+        length = over_poses[index, index % 4]
         attained = length - ranges[index, 1] if index < 4 else ranges[index - 4, 0] - length
         assert attained == pytest.approx(found.values[index], abs=1e-9)
-    assert len(limit_names(terms)) == len(found.values)
+    rows = np.concatenate([each.missed_rows(worst) for each in limits_of(terms)], axis=1)
+    assert np.diag(rows[8:]) == pytest.approx(found.values[8:], abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -156,22 +153,58 @@ def test_demands_over_cells_exceed_no_bound(seed: int) -> None:
     random = np.random.default_rng(seed)
     terms = Terms.of(EVERYTHING)
     x = random_machine(random, tool=seed % 2 == 0)
-    with np.errstate(all="ignore"):
-        found = prove_demands(x, terms, 3000)
-        amounts = missed_amounts(x, terms, poses_of(random_places(random, terms, 4000)))
-    worst = np.nan_to_num(amounts, nan=np.inf).max(axis=0)
-    is_looked_at = found.values <= 0.0
-    assert (worst <= found.bounds + 1e-9)[is_looked_at].all()
-    assert is_looked_at.any()
+    at = terms.values(x, random_poses(random, terms, 4000))
+    is_looked_at = False
+    for demand in demands_of(terms):
+        with np.errstate(all="ignore"):
+            found = prove_demand(demand, x, terms, 3000)
+            worst = demand.missed_rows(at).max(axis=0)
+        within = found.values <= 0.0
+        assert (worst <= found.bounds + 1e-9)[within].all(), demand.name
+        is_looked_at |= bool(within.any())
+    assert is_looked_at
 
 
 def test_demands_sampled_find_the_worst_of_many_poses() -> None:
     random = np.random.default_rng(0)
     terms = Terms.of(EVERYTHING)
     x = random_machine(random, tool=True)
-    found = sample_demands(x, terms, 2000)
-    worst = missed_amounts(x, terms, poses_of(random_places(random, terms, 20_000))).max(axis=0)
-    assert (found.values >= worst - 0.01 * np.abs(worst) - 1e-3).all()
+    at = terms.values(x, random_poses(random, terms, 20_000))
+    for demand in demands_of(terms):
+        found = sample_demand(demand, x, terms, 2000)
+        worst = demand.missed_rows(at).max(axis=0)
+        assert (found.values >= worst - 0.01 * np.abs(worst) - 1e-3).all()
+
+
+def test_demands_tell_their_values_in_their_units() -> None:
+    random = np.random.default_rng(4)
+    terms = Terms.of(EVERYTHING)
+    x, pose = random_machine(random, tool=False), random_poses(random, terms, 1)
+    at = terms.values(x, pose)
+    told = {
+        demand.name: (demand.told(np.zeros(1)), demand.told(demand.missed_rows(at)[0]))
+        for demand in (*limits_of(terms), *demands_of(terms))
+    }
+    size = terms.scale_mm
+    limits = {name: float(limit[0]) for name, (limit, _) in told.items()}
+    assert limits == pytest.approx(
+        {
+            "margin": EVERYTHING.least_margin_mm,
+            "carriage order": 0.0,
+            "swing": 45.0,
+            "clearance": 5.0,
+            "force": 200.0,
+            "speed": 500.0,
+            "transmission index": 0.01,
+            "error": 50.0,
+            "deflection": 5.0,
+        }
+    )
+    assert told["margin"][1] == pytest.approx(size * np.ravel(at.sides)[:3] * np.ravel(at.margins))
+    assert told["clearance"][1] == pytest.approx(size * np.ravel(at.distances) - 16.0)
+    assert told["transmission index"][1] == pytest.approx(np.ravel(at.transmissions))
+    error = 0.05 * np.abs(np.ravel(at.tool_speeds)).sum()
+    assert 0.0 < told["error"][1][0] <= error
 
 
 def test_affine_forms_bound_formulas_with_an_error_of_second_order() -> None:
@@ -209,6 +242,4 @@ def test_bounds_of_an_improvement_are_kept_at_its_start() -> None:
     random = np.random.default_rng(2)
     terms = Terms.of(EVERYTHING)
     x = random_machine(random, tool=False)
-    poses = BoxPoses(np.zeros((1, 3)), tilt_vectors(np.zeros((1, 2))))
-    assert math.isfinite(Improvement(terms, "balanced", x).cost(poses))
-    assert isinstance(terms.values(x, poses), MachineValues)
+    assert math.isfinite(Improvement(terms, "balanced", x).cost(HOME))

@@ -44,7 +44,7 @@ class CheckCommand(options.JsonOptions, options.DesignOptions):
         """Write the demands with their worst values."""
         requirement, design = load_requirement(self.requirement), self.read_design()
         check = check_requirement(design, requirement)
-        missed = ", ".join(demand.name for demand in check.missed)
+        missed = ", ".join(demand.words for demand in check.missed)
         self.write(
             lambda: {
                 "kept": check.kept,
@@ -181,7 +181,7 @@ def check_lines(design: Design, requirement: Requirement, check: RequirementChec
         if demand.worst == demand.limit == demand.spare == 0.0:
             numbers = [""] * 3
         verdict = "proven" if demand.proven else "kept" if demand.kept else "missed"
-        rows.append((demand.name, *numbers, demand.unit, verdict, _place(design, demand)))
+        rows.append((demand.words, *numbers, demand.unit, verdict, _place(design, demand)))
     yield output.table(rows, "<>>><<<")
     kept = len(check.demands) - len(check.missed)
     proven = sum(demand.proven for demand in check.demands)

@@ -76,7 +76,7 @@ def _card(index: int, one: FoundDesign) -> str:
     name, check = one.kind.replace("-", " ").capitalize(), one.check
     proof = "Proven" if check.proven else f"No violation in {format_number(check.poses)} poses"
     if check.missed:
-        proof = f'<span class="ex-beyond">Misses {escape(check.missed[0].name)}</span>'
+        proof = f'<span class="ex-beyond">Misses {escape(check.missed[0].words)}</span>'
     numbers = markup.table(markup.row(markup.dim(label), text) for label, text in rows if text)
     main = " is-main" * (index == 0)
     content = (
@@ -116,7 +116,7 @@ def _demand_row(demand: DemandCheck) -> str:
     values = f"{worst} {sign} {limit}{unit}" if demand.worst else ""
     missed = f"by {short}{unit}" if demand.spare else "no"
     level, mark = ("within", "✓") if demand.kept else ("beyond", missed)
-    name = escape(f"{demand.name[:1].upper()}{demand.name[1:]}")
+    name = escape(f"{demand.words[:1].upper()}{demand.words[1:]}")
     content = f'<span>{name}</span><span>{values}</span><span class="ex-{level}">{mark}</span>'
     hint = "Proven." if demand.proven else _sentences(demand.remark or "checked in poses")
     if demand.pose is not None:
