@@ -23,6 +23,7 @@ from explorer.find.certificate import Certificate, certify, is_regular, lengths_
 from explorer.find.check import check_machine
 from explorer.find.improvement import Improvement, free_variables
 from explorer.find.nearest import nearest_values, relaxable_fields
+from explorer.find.over_tilts import nearest_poses
 from explorer.find.requirement import PREFERENCES, Preference, Requirement
 from explorer.find.terms import Terms, design_of, row_of
 from explorer.mechanism.design import LENGTHS, Design
@@ -43,6 +44,12 @@ NEAREST_SECONDS = 2.0
 PATIENCE = 4.0
 # Rounds of an improvement and a certificate, and cells of poses of the latter.
 ROUNDS, CELLS, FINAL_CELLS = 8, 4000, 20_000
+# Azimuths of the tilts in whose nearest places an improvement looks.
+AZIMUTHS = 16
+# Amount of a miss between the poses up to which the next round leaves as much to spare.
+SPARE = 5e-3
+# Amount of a miss at which an improvement goes on with more poses.
+NEARLY = 1e-3
 # Random machines that are certified as they are until one is kept, and improved ones of a block.
 TRIED, IMPROVED = 8, 6
 # Share of the distance of legs beyond which a clearance that is missed is that of crossed legs.
@@ -154,8 +161,14 @@ class Search:
                     yield kept
             score = np.log(large) + 4.0 * np.maximum(missed, 0.0)
             order = np.argsort(score)[: IMPROVED if first else IMPROVED // 2]
+            before, others = self.best.get(self.kinds[0]), self.kinds[1:] if first else ()
             for row in order:
                 yield x[row], self.kinds[0]
+                best = self.best.get(self.kinds[0])
+                if best is not None and best is not before:
+                    for kind in others:
+                        yield best.x, kind
+                    others = ()
             first = False
             for kind in self.kinds:
                 if self.best:
@@ -194,12 +207,17 @@ class Search:
     def _improve(
         self, x: FloatArray, kind: Preference, found: Certificate, poses: FloatArray
     ) -> Machine | None:
+        azimuths = np.linspace(-math.pi, math.pi, AZIMUTHS + 1)[1:]
+        tilts = np.array([(0.0, 0.0), *((each, self.terms.tilt) for each in azimuths)])
         for _ in range(ROUNDS):
-            poses = np.concatenate([poses, found.worst_poses])
-            search = Improvement(self.terms, kind, x, lambda: self.spend(EVALUATION_UNITS))
+            nearest = nearest_poses(x, self.terms, tilts)
+            poses = np.concatenate([poses, found.worst_poses, nearest])
+            missed = float(found.missed.max())
+            spare = missed if 0.0 < missed < SPARE else 0.0
+            search = Improvement(self.terms, kind, x, lambda: self.spend(EVALUATION_UNITS), spare)
             improved = search.run(poses)
             x = improved.x
-            if improved.missed > 1e-5 or not is_regular(x):
+            if improved.missed > NEARLY or not is_regular(x):
                 return None
             self.spend(CERTIFICATE_UNITS)
             found = certify(x, self.terms, cells=CELLS, poses=poses, is_quick=True)

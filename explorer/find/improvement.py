@@ -78,7 +78,8 @@ def free_variables(terms: Terms) -> list[int]:
 class Improvement:
     """A requirement and a preference as the functions of an SQP solver, from a machine on.
 
-    The demands are looked at in poses; each round takes those that a machine nearly misses.
+    The demands are looked at in poses; each round takes those that a machine nearly misses. Each
+    demand has an amount to spare, over the diagonal of the box or over its limit.
     """
 
     def __init__(
@@ -87,11 +88,13 @@ class Improvement:
         preference: Preference,
         start: FloatArray,
         before_each: Callable[[], None] = lambda: None,
+        spare: float = 0.0,
     ) -> None:
         self.terms, self.weights, self.start = terms, WEIGHTS[preference], start
         self.demands = [*limits_of(terms), *demands_of(terms)]
         self.sides = terms.values(start, m.HOME).sides
         self.free, self._before_each = free_variables(terms), before_each
+        self.spare = spare
         self.extra = [each for each in self.weights if each != LENGTH]
 
     def table(self, x: Any, poses: FloatArray, bounds: Any) -> Any:
@@ -108,10 +111,10 @@ class Improvement:
         rows = [length - short for length, short in zip(at.lengths, shortest, strict=True)]
         rows += [longest - length for length in at.lengths]
         if math.isfinite(terms.ratio):
-            ratio = terms.ratio * (1.0 - RESERVE)
+            ratio = terms.ratio * (1.0 - RESERVE - self.spare)
             rows += [ratio * short - each for each, short in zip(at.lengths, shortest, strict=True)]
         for demand in self.demands:
-            rows += [-each - demand.reserve for each in demand.missed(at)]
+            rows += [-each - demand.reserve - self.spare for each in demand.missed(at)]
         if terms.parts is not None:
             rows += self._parts(terms.parts, shortest, at)
         rows += self._preferred(at, bounds.T[5:, :, None])
@@ -131,7 +134,8 @@ class Improvement:
             speeds = at.tool_speeds
             match kind:
                 case 1:
-                    rows += [bound - np.log(each) for each in speeds]
+                    # The rate of leg 1 does not move a tool at b4.
+                    rows += [bound - 0.5 * np.log(each * each + 1e-9) for each in speeds]
                 case 2:
                     rows.append(bound - np.log(sum(each * each for each in speeds)))
                 case 3:
@@ -185,7 +189,7 @@ class Improvement:
                 trusted *= 0.5
             more = self._worst_rows(new_x, poses, new_bounds)
             rows = np.unique(np.concatenate([rows, more]), axis=0)
-            if missed <= FEASIBLE and 0.0 < gain < SETTLED:
+            if missed <= FEASIBLE and abs(gain) < SETTLED:
                 break
             is_hopeless = missed > (HOPELESS if turn < LONG else FEASIBLE)
             if trusted < LEAST_TRUSTED or (turn >= PATIENCE and is_hopeless):

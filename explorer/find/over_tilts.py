@@ -85,6 +85,12 @@ def prove_limits(x: FloatArray, terms: Terms, ranges: FloatArray) -> CellValues:
     return found._replace(places=np.column_stack([places, found.places]))
 
 
+def nearest_poses(x: FloatArray, terms: Terms, tilts: FloatArray) -> FloatArray:
+    """Return the poses with the shortest lengths of a machine at azimuths and tilts (n, 2)."""
+    places = _nearest(x, terms, tilts)[0].reshape(-1, 3)
+    return np.column_stack([places, np.repeat(tilts, 4, axis=0)])
+
+
 def _rates(x: FloatArray, terms: Terms) -> FloatArray:
     """Return how fast each limit is missed by the errors e of interpolated vectors."""
     tool = x[m.TX : m.TILT]
