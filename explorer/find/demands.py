@@ -18,6 +18,7 @@ from explorer.find.machine_values import MachineValues
 from explorer.find.terms import Terms
 from explorer.legs.clearance import PAIRS, pair_name
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS
+from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.numerics.arrays import FloatArray
 
 # Signs of errors, up to a common one.
@@ -94,9 +95,10 @@ def limits_of(terms: Terms) -> list[Demand]:
         cosine = math.cos(terms.swing)
 
         def beyond(at: MachineValues) -> list[Any]:
-            # Concave in the leg, and the distance of its end from the cone to first order.
-            lengths = [at.lengths[i] for i in m.SWINGING]
-            return [cosine * a - b for a, b in zip(lengths, at.along_home, strict=True)]
+            # Convex in the leg, unlike the angle and its cosine.
+            sizes = [(at.lengths[i], at.home.lengths[i]) for i in m.SWINGING]
+            rows = zip(sizes, at.along_home, strict=True)
+            return [(cosine * length - along) / own for (length, own), along in rows]
 
         def angles(at: MachineValues) -> list[Any]:
             return [np.degrees(np.arccos(np.clip(each, -1.0, 1.0))) for each in at.swings]
@@ -112,11 +114,14 @@ def demands_of(terms: Terms) -> list[Demand]:
 
 
 def _clearances(terms: Terms) -> Iterator[Demand]:
+    def distances(at: MachineValues) -> list[Any]:
+        return at.distances
+
     if terms.distance > 0.0:
         yield Demand(
             "clearance",
             tuple(f"legs {pair_name(pair)}" for pair in PAIRS),
-            _distances,
+            distances,
             terms.distance,
             "mm",
             terms.scale_mm,
@@ -126,84 +131,77 @@ def _clearances(terms: Terms) -> Iterator[Demand]:
         )
 
 
-def _distances(at: MachineValues) -> list[Any]:
-    return at.distances
-
-
-def _transmissions(at: MachineValues) -> list[Any]:
-    return at.transmissions
-
-
 def _of_actuators(terms: Terms) -> Iterator[Demand]:
     """Yield the demands on what the actuators do, over their limits."""
-    requirement = terms.requirement
-    weight: m.Vec = tuple(terms.weight.tolist())
-    centre: m.Vec = tuple(terms.centre.tolist())
+    need, legs, payload = terms.requirement, terms.requirement.legs, terms.requirement.payload
+    weight = payload.mass_kg * STANDARD_GRAVITY * np.array(need.gravity)
+    centre, force = np.array(payload.centre_mm) / terms.scale_mm, payload.force_n
 
-    def forces(at: MachineValues) -> list[Any]:
-        held = at.weight_forces(weight, centre)
-        return [
-            np.maximum(
-                (m.most(own) + terms.force * speed) / terms.push,
-                (m.most(-own) + terms.force * speed) / terms.pull,
-            )
-            for own, speed in zip(held, at.tool_speeds, strict=True)
-        ]
-
-    def speeds(at: MachineValues) -> list[Any]:
-        found: list[Any] = []
-        for joint, point in enumerate(m.POINTS):
-            leg = m.times(1.0 / at.lengths[point], at.legs[point])
-            along: m.Vec = (1.0, 0.0, 0.0) if joint in GUIDE_ROWS else leg
-            lever = m.longest(m.cross(m.minus(at.ends[point], at.tool), along))
-            found.append((terms.velocity + terms.turning * lever) / terms.speed)
-        return found
-
-    def error(at: MachineValues) -> list[Any]:
-        # The errors of all actuators have one size, so that signs alone tell the sums apart.
-        sums: list[Any] = []
-        for signs in SIGNS.tolist():
-            total, *others = at.velocities
-            for sign, velocity in zip(signs, others, strict=True):
-                total = m.plus(total, m.times(sign, velocity))
-            sums.append(m.longest(total))
-        return [terms.actuator_error / terms.error * np.max(sums, axis=0)]
-
-    def deflection(at: MachineValues) -> list[Any]:
-        held = at.weight_forces(weight, centre)
-        bends = [
-            speed * (m.size(own) + terms.force * speed)
-            for speed, own in zip(at.tool_speeds, held, strict=True)
-        ]
-        return [terms.flexibility / terms.deflection * sum(bends)]
+    def held(at: MachineValues) -> list[Any]:
+        return at.weight_forces(tuple(weight), tuple(centre))
 
     def demand(
-        name: str, items: tuple[str, ...], values: Any, unit: str, limit: float | None
+        name: str,
+        items: tuple[str, ...],
+        values: Callable[[MachineValues], list[Any]],
+        limit: float,
+        unit: str,
     ) -> Demand:
-        is_singular = name != "speed"
-        most = limit or math.inf
-        return Demand(name, items, values, 1.0, unit, most, 0.0, False, STEEP, is_singular)
+        return Demand(name, items, values, 1.0, unit, limit, reserve=STEEP, is_singular=True)
 
-    legs = requirement.legs
-    if math.isfinite(terms.push) and (terms.force or terms.weight.any()):
-        yield demand("force", JOINTS, forces, "N", min(terms.push, terms.pull))
-    if math.isfinite(terms.speed) and (terms.velocity or terms.turning):
-        yield demand("speed", JOINTS, speeds, "mm/s", legs.speed_mm_s)
-    if terms.transmission:
-        least = terms.transmission
-        reserve = STEEP * least
-        yield Demand(
-            "transmission index",
-            JOINTS,
-            _transmissions,
-            least,
-            "",
-            1.0,
-            is_least=True,
-            reserve=reserve,
-            is_singular=True,
-        )
-    if math.isfinite(terms.error):
-        yield demand("error", ("",), error, "mm", requirement.error_mm)
-    if math.isfinite(terms.deflection):
-        yield demand("deflection", ("",), deflection, "mm", requirement.deflection_mm)
+    if (push := legs.push_n) is not None and (payload.mass_kg or force):
+        pull = legs.pull_n or push
+
+        def forces(at: MachineValues) -> list[Any]:
+            return [
+                np.maximum(
+                    (m.most(own) + force * gain) / push, (m.most(-own) + force * gain) / pull
+                )
+                for own, gain in zip(held(at), at.tool_speeds, strict=True)
+            ]
+
+        yield demand("force", JOINTS, forces, min(push, pull), "N")
+    speed, turning = need.tool.speed_mm_s, math.radians(need.tool.turning_deg_s) * terms.scale_mm
+    if (fastest := legs.speed_mm_s) is not None and (speed or turning):
+
+        def speeds(at: MachineValues) -> list[Any]:
+            found: list[Any] = []
+            for joint, point in enumerate(m.POINTS):
+                leg = m.times(1.0 / at.lengths[point], at.legs[point])
+                along: m.Vec = (1.0, 0.0, 0.0) if joint in GUIDE_ROWS else leg
+                lever = m.longest(m.cross(m.minus(at.ends[point], at.tool), along))
+                found.append((speed + turning * lever) / fastest)
+            return found
+
+        yield demand("speed", JOINTS, speeds, fastest, "mm/s")._replace(is_singular=False)
+    if (least := need.transmission) is not None:
+
+        def transmissions(at: MachineValues) -> list[Any]:
+            return at.transmissions
+
+        index = demand("transmission index", JOINTS, transmissions, 1.0, "")
+        yield index._replace(limit=least, is_least=True, reserve=STEEP * least)
+    if (most_error := need.error_mm) is not None:
+
+        def error(at: MachineValues) -> list[Any]:
+            # The errors of all actuators have one size, so that signs alone tell the sums apart.
+            sums: list[Any] = []
+            for signs in SIGNS.tolist():
+                total, *others = at.velocities
+                for sign, velocity in zip(signs, others, strict=True):
+                    total = m.plus(total, m.times(sign, velocity))
+                sums.append(m.longest(total))
+            return [legs.error_mm / most_error * np.max(sums, axis=0)]
+
+        yield demand("error", ("",), error, most_error, "mm")
+    if (most_bend := need.deflection_mm) is not None:
+        compliance = 1.0 / (legs.stiffness_n_mm or math.inf)
+
+        def deflection(at: MachineValues) -> list[Any]:
+            bends = [
+                gain * (m.size(own) + force * gain)
+                for gain, own in zip(at.tool_speeds, held(at), strict=True)
+            ]
+            return [compliance / most_bend * sum(bends)]
+
+        yield demand("deflection", ("",), deflection, most_bend, "mm")

@@ -21,6 +21,7 @@ from explorer.find.bound import impossible_demands, least_longest_mm
 from explorer.find.candidates import candidates, standard_poses
 from explorer.find.certificate import Certificate, certify, is_regular, lengths_over
 from explorer.find.check import check_machine
+from explorer.find.demands import demands_of
 from explorer.find.improvement import Improvement, free_variables
 from explorer.find.nearest import nearest_values, relaxable_fields
 from explorer.find.over_tilts import nearest_poses
@@ -368,21 +369,14 @@ def _answer(found: Machine, terms: Terms, base: Design | None) -> FoundDesign:
     poses = np.concatenate([standard_poses(terms.tilt), certificate.poses])
     at = terms.values(found.x, poses)
     speeds = np.stack(np.broadcast_arrays(*at.tool_speeds))
-    held = np.stack(
-        np.broadcast_arrays(
-            *at.weight_forces(tuple(terms.weight.tolist()), tuple(terms.centre.tolist()))
-        )
-    )
-    forces = np.maximum(
-        (held + terms.force * speeds) / terms.push, (terms.force * speeds - held) / terms.pull
-    )
+    used = (each.values(at) for each in demands_of(terms) if each.name == "force")
     legs = terms.requirement.legs
     return FoundDesign(
         design=design,
         check=check_machine(design, found.x, terms, certificate),
         kind=found.kind,
         longest_mm=float(terms.scale_mm * certificate.ranges[:, 1].max()),
-        utilisation=float(forces.max()),
+        utilisation=float(max((np.max(each) for each in used), default=0.0)),
         force_per_newton=float(speeds.max()),
         clearance_mm=float(terms.scale_mm * np.min(at.distances)) - legs.diameter_mm,
         transmission=float(np.min(at.transmissions)),

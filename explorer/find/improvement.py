@@ -143,7 +143,7 @@ class Improvement:
                 case 4:
                     rows += [bound + np.log(each) for each in at.transmissions]
                 case _:
-                    rows += [bound + np.log(each) for each in at.distances]
+                    rows += [bound + np.log(m.size(each)) for each in at.distances]
         return rows
 
     def _first_bounds(self, x: FloatArray, poses: FloatArray) -> FloatArray:

@@ -10,14 +10,19 @@ and bound the results over cells of poses.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from explorer.legs.clearance import PAIRS
+from explorer.mechanism.margins import margins_of
+from explorer.motion.inverse_jacobian import held_by_legs
+from explorer.numerics import vectors
 from explorer.numerics.affine import Affine, largest_norm
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.vectors import cross3, dot3
 
 Vec = tuple[Any, Any, Any]
 """The x, y and z of vectors, arrays or numbers."""
@@ -51,29 +56,19 @@ Poses over a required box are rows of five numbers: places in the box, from −1
 its edges, and the azimuth of the axis and the angle of a tilt, in radians."""
 
 
+dot: Callable[[Vec, Vec], Any] = dot3
+cross: Callable[[Vec, Vec], Vec] = cross3
+minus: Callable[[Vec, Vec], Vec] = vectors.minus
+
+
 def plus(a: Vec, b: Vec) -> Vec:
     """Return a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-def minus(a: Vec, b: Vec) -> Vec:
-    """Return a − b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
 def times(s: Any, a: Vec) -> Vec:
     """Return s a."""
     return s * a[0], s * a[1], s * a[2]
-
-
-def dot(a: Vec, b: Vec) -> Any:
-    """Return a · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Vec, b: Vec) -> Vec:
-    """Return a × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def norm(a: Vec) -> Any:
@@ -113,7 +108,7 @@ class MachineValues:
 
     def __init__(self, machines: Any, edges: FloatArray, poses: FloatArray) -> None:
         self.machines, self.edges, self.poses = machines, edges, poses
-        x: list[Any] = [column[..., None] for column in np.moveaxis(machines, -1, 0)]
+        x: Any = [column[..., None] for column in np.moveaxis(machines, -1, 0)]
         self.x = x
         along = (0.5 * edges * poses[:, :3]).T
         c, s = np.cos(x[BOX_YAW]), np.sin(x[BOX_YAW])
@@ -138,11 +133,16 @@ class MachineValues:
         return plus(plus(times(a[0], self.u), times(a[1], self.v)), times(a[2], self.w))
 
     @cached_property
-    def ends(self) -> list[Vec]:
+    def arm1(self) -> Vec:
+        """The point b1 from b4."""
+        return plus(times(self.x[B1X], self.u), times(self.x[B1Y], self.v))
+
+    @cached_property
+    def ends(self) -> tuple[Vec, Vec, Vec, Vec]:
         """Platform ends of the four legs."""
-        x, p = self.x, self.p
-        b1 = plus(p, plus(times(x[B1X], self.u), times(x[B1Y], self.v)))
-        return [b1, plus(p, times(x[B2], self.u)), plus(p, times(x[B3], self.u)), p]
+        p, u = self.p, self.u
+        b2, b3 = (plus(p, times(self.x[b], u)) for b in (B2, B3))
+        return plus(p, self.arm1), b2, b3, p
 
     @cached_property
     def bases(self) -> list[Vec]:
@@ -165,10 +165,9 @@ class MachineValues:
         return [norm(leg) for leg in self.legs]
 
     @cached_property
-    def margins(self) -> list[Any]:
+    def margins(self) -> Vec:
         """The margins δ1, δ2 and δ3."""
-        p, u, w = self.p, self.u, self.w
-        return [-dot(w, p), u[1] * p[2] - u[2] * p[1], p[2]]
+        return margins_of(self.p, self.u, self.w)
 
     @property
     def order(self) -> Any:
@@ -230,29 +229,12 @@ class MachineValues:
         return [_distance(*legs[i - 1], *legs[j - 1]) for i, j in PAIRS]
 
     def forces(self, force: Vec, moment: Vec) -> list[Any]:
-        """Return the actuators' forces that hold a wrench about b4, in the order of the joints.
-
-        The closed form is that of `explorer.motion.inverse_jacobian`.
-        """
-        x, p, u = self.x, self.p, self.u
-        d1, d2, d3 = self.margins
-        leg1, _, _, leg4 = self.legs
-        f1 = dot(moment, u) / (x[B1Y] * d1)
-        f4 = -(moment[0] + p[1] * force[2] - p[2] * force[1]) / (x[A3Y] * d3)
-        rest = plus(plus(force, times(f1, leg1)), times(f4, leg4))
-        turning = plus(moment, times(f1, cross(minus(leg1, p), leg1)))
-        lever = cross(u, rest)
-        held: list[Vec] = []
-        for own, other, side in ((self.ends[1], x[B3], 1.0), (self.ends[2], x[B2], -1.0)):
-            across = cross(minus(turning, times(other, lever)), u)
-            q = times(side / (x[B3] - x[B2]), across)
-            held.append(plus(q, times((own[1] * q[2] - own[2] * q[1]) / d2, u)))
-        struts = [
-            (end[1] * h[1] + end[2] * h[2]) / length
-            for end, h, length in zip(self.ends[1:3], held, self.lengths[1:3], strict=True)
-        ]
-        l1, l4 = self.lengths[0], self.lengths[3]
-        return [f1 * l1, held[0][0], struts[0], held[1][0], struts[1], f4 * l4]
+        """Return the actuators' forces that hold a wrench about b4, in the order of the joints."""
+        x, ends, (l1, d2, d4, l4) = self.x, self.ends, self.lengths
+        f1, held2, held3, f4 = held_by_legs(x, self.u, self.arm1, ends, self.margins, force, moment)
+        _, b2, b3, _ = ends
+        strut2, strut3 = ((b[1] * q[1] + b[2] * q[2]) for b, q in ((b2, held2), (b3, held3)))
+        return [f1 * l1, held2[0], strut2 / d2, held3[0], strut3 / d4, f4 * l4]
 
     def weight_forces(self, weight: Vec, centre: Vec) -> list[Any]:
         """Return the actuators' forces under a weight at a point of the platform, from b4."""

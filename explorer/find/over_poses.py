@@ -95,7 +95,7 @@ class MachineOverCells(MachineValues):
     """
 
     def __init__(self, at: MachineValues, half: FloatArray, tilts: FloatArray) -> None:
-        self.x = [float(np.squeeze(each)) for each in at.x]  # type: ignore[assignment]
+        self.x = [float(np.squeeze(each)) for each in at.x]
         self.middle, self.poses = at, at.poses
         self.home, self.home_axes = at.home, at.home_axes
         k, x = len(half), self.x

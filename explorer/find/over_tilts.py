@@ -102,10 +102,12 @@ def _rates(x: FloatArray, terms: Terms) -> FloatArray:
     rates += [float(lengths_of(tool)), abs(float(x[m.B3] - x[m.B2]))]
     if terms.swing < math.pi:
         cosine, base = math.cos(terms.swing), farthest + math.hypot(*x[:2])
-        rates += [(1.0 + cosine) * arms[0], (1.0 + cosine) * arms[3]]
+        swings = [(1.0 + cosine) * arms[0], (1.0 + cosine) * arms[3]]
         # For legs 2 and 3 a product of two turning vectors is interpolated.
-        rates += [base + cosine * arms[0], *(farthest + (4.0 + cosine) * arms[1:3])]
-        rates += [base + cosine * arms[3]]
+        swings += [base + cosine * arms[0], *(farthest + (4.0 + cosine) * arms[1:3])]
+        swings += [base + cosine * arms[3]]
+        home = np.ravel(terms.values(x, m.HOME).lengths)
+        rates += [*np.array(swings) / home[list(m.SWINGING)]]
     return np.array(rates)
 
 

@@ -18,7 +18,7 @@ from explorer.find.machine_values import MachineValues
 from explorer.find.requirement import Requirement
 from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import LENGTHS, Design, Limits, Swing
-from explorer.mechanism.machine import STANDARD_GRAVITY, Actuators, Payload, Tool
+from explorer.mechanism.machine import Actuators, Payload, Tool
 from explorer.mechanism.pose import (
     Pose,
     Triple,
@@ -98,12 +98,6 @@ class Terms:
         margin: Least margin.
         swing: Half-angle of the cones; π without one.
         distance: Least distance of the axes of two legs; 0 for none.
-        push, pull: Largest forces of the actuators.
-        weight, centre, force: Weight (3,), its point from b4, and the force of any direction.
-        actuator_error, flexibility: Error of each actuator; shortening by a newton.
-        transmission, error, deflection: Limits of these; 0 and infinite for none.
-        speed, velocity, turning: Largest rate of a joint; speed and rate of turning of the tool.
-        hull: Largest edge of the box about all joints.
         parts: Sizes of the parts where they must fit; None otherwise.
     """
 
@@ -116,33 +110,16 @@ class Terms:
     margin: float
     swing: float
     distance: float
-    push: float
-    pull: float
-    weight: FloatArray
-    centre: FloatArray
-    force: float
-    actuator_error: float
-    flexibility: float
-    transmission: float
-    error: float
-    deflection: float
-    speed: float
-    velocity: float
-    turning: float
-    hull: float
     parts: Parts | None
 
     @staticmethod
     def of(requirement: Requirement) -> Terms:
         """Return the terms of a requirement."""
-        legs, payload, scale = requirement.legs, requirement.payload, requirement.diagonal_mm
+        legs, scale = requirement.legs, requirement.diagonal_mm
 
         def most(value: float | None, unit: float = 1.0) -> float:
             return math.inf if value is None else value / unit
 
-        push = most(legs.push_n)
-        weight = payload.mass_kg * STANDARD_GRAVITY * np.array(requirement.gravity)
-        stiffness = legs.stiffness_n_mm
         return Terms(
             requirement=requirement,
             scale_mm=scale,
@@ -153,20 +130,6 @@ class Terms:
             margin=requirement.least_margin_mm / scale,
             swing=math.radians(requirement.swing_deg or 180.0),
             distance=(legs.diameter_mm + legs.apart_mm) / scale,
-            push=push,
-            pull=push if legs.pull_n is None else legs.pull_n,
-            weight=weight,
-            centre=np.array(payload.centre_mm) / scale,
-            force=payload.force_n,
-            actuator_error=legs.error_mm / scale,
-            flexibility=0.0 if stiffness is None else 1.0 / stiffness / scale,
-            transmission=requirement.transmission or 0.0,
-            error=most(requirement.error_mm, scale),
-            deflection=most(requirement.deflection_mm, scale),
-            speed=most(legs.speed_mm_s, scale),
-            velocity=requirement.tool.speed_mm_s / scale,
-            turning=math.radians(requirement.tool.turning_deg_s),
-            hull=most(requirement.hull_mm, scale),
             parts=Parts.of(legs.diameter_mm, scale) if requirement.buildable else None,
         )
 
@@ -213,6 +176,7 @@ def design_of(
     def six(value: float | None) -> Any:
         return None if value is None else (value,) * 6
 
+    own_centre = point(np.array(payload.centre_mm) / terms.scale_mm)
     rotation = rotation_from_yaw_pitch_roll(np.degrees(x[m.YAW : m.TX]))
     centre, tool = x[m.HX : m.BOX_YAW], x[m.TX : m.TILT]
     half = 0.5 * terms.edges
@@ -236,7 +200,7 @@ def design_of(
         "limits": limits,
         "home": Pose.of(scale * centre - rotation @ (scale * tool), rotation),
         "tool": Tool(point(tool)),
-        "payload": Payload(payload.mass_kg, point(terms.centre), payload.force_n),
+        "payload": Payload(payload.mass_kg, own_centre, payload.force_n),
         "gravity": requirement.gravity,
         "actuators": Actuators(
             push_n=six(legs.push_n),

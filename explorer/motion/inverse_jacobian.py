@@ -57,36 +57,54 @@ def held_across(q: Vector, u: Vector, point: Vector, delta2: float) -> Vector:
 
 
 @helper
+def held_by_legs(
+    x: FloatArray,
+    u: Vector,
+    arm1: Vector,
+    ends: tuple[Vector, Vector, Vector, Vector],
+    deltas: Vector,
+    force: Vector,
+    moment: Vector,
+) -> tuple[float, Vector, Vector, float]:
+    """Return what holds a force and a moment about b4 in a regular pose.
+
+    These are the forces of legs 1 and 4 over their lengths, and those of legs 2 and 3 as vectors
+    between them. The platform ends of the legs are given, and b1 from b4.
+    """
+    b1, b2, b3, p = ends
+    leg4 = (p[0] - x[A3X], p[1] - x[A3Y], p[2])
+    f1 = dot3(moment, u) / (x[B1Y] * deltas[0])
+    f4 = -(moment[0] + p[1] * force[2] - p[2] * force[1]) / (x[A3Y] * deltas[2])
+    rest = along(along(force, f1, b1), f4, leg4)
+    turning = along(moment, f1, cross3(arm1, b1))
+    lever, zero, span = cross3(u, rest), (0.0, 0.0, 0.0), x[B3] - x[B2]
+    across2 = cross3(along(turning, -x[B3], lever), u)
+    across3 = cross3(along(turning, -x[B2], lever), u)
+    held2 = held_across(along(zero, 1.0 / span, across2), u, b2, deltas[1])
+    held3 = held_across(along(zero, -1.0 / span, across3), u, b3, deltas[1])
+    return f1, held2, held3, f4
+
+
+@helper
 def holding_forces(
     x: FloatArray, p: FloatArray, r: FloatArray, force: Vector, moment: Vector
 ) -> tuple[float, float, float, float, float, float]:
     """Return the actuator forces that hold a force and a moment about b4 in a regular pose."""
     u, v, b4 = column(r, 0), column(r, 1), (p[0], p[1], p[2])
     zero = (0.0, 0.0, 0.0)
-    delta1, delta2, delta3 = margins_of(b4, u, column(r, 2))
     arm1 = along(along(zero, x[B1X], u), x[B1Y], v)
-    leg1 = along(b4, 1.0, arm1)
+    b1, b2, b3 = along(b4, 1.0, arm1), along(b4, x[B2], u), along(b4, x[B3], u)
+    deltas = margins_of(b4, u, column(r, 2))
+    f1, held2, held3, f4 = held_by_legs(x, u, arm1, (b1, b2, b3, b4), deltas, force, moment)
     leg4 = (p[0] - x[A3X], p[1] - x[A3Y], p[2])
-    l1, l4 = math.sqrt(dot3(leg1, leg1)), math.sqrt(dot3(leg4, leg4))
-    # Forces over lengths.
-    f1 = dot3(moment, u) / (x[B1Y] * delta1)
-    f4 = -(moment[0] + p[1] * force[2] - p[2] * force[1]) / (x[A3Y] * delta3)
-    rest = along(along(force, f1, leg1), f4, leg4)
-    turning = along(moment, f1, cross3(arm1, leg1))
-    lever = cross3(u, rest)
-    span = x[B3] - x[B2]
-    c2, c3 = along(b4, x[B2], u), along(b4, x[B3], u)
-    across2 = cross3(along(turning, -x[B3], lever), u)
-    across3 = cross3(along(turning, -x[B2], lever), u)
-    held2 = held_across(along(zero, 1.0 / span, across2), u, c2, delta2)
-    held3 = held_across(along(zero, -1.0 / span, across3), u, c3, delta2)
-    d2, d4 = math.sqrt(c2[1] * c2[1] + c2[2] * c2[2]), math.sqrt(c3[1] * c3[1] + c3[2] * c3[2])
+    l1, l4 = math.sqrt(dot3(b1, b1)), math.sqrt(dot3(leg4, leg4))
+    d2, d4 = math.sqrt(b2[1] * b2[1] + b2[2] * b2[2]), math.sqrt(b3[1] * b3[1] + b3[2] * b3[2])
     return (
         f1 * l1,
         held2[0],
-        (c2[1] * held2[1] + c2[2] * held2[2]) / d2,
+        (b2[1] * held2[1] + b2[2] * held2[2]) / d2,
         held3[0],
-        (c3[1] * held3[1] + c3[2] * held3[2]) / d4,
+        (b3[1] * held3[1] + b3[2] * held3[2]) / d4,
         f4 * l4,
     )
 

@@ -131,7 +131,8 @@ def test_limits_over_tilts_exceed_no_bound_and_are_attained(seed: int) -> None:
     sides = np.ravel(at.sides)
     missed += [terms.margin - side * each for side, each in zip(sides, at.margins, strict=False)]
     missed.append(-sides[3] * np.broadcast_to(at.order, lengths[0].shape))
-    missed += [*((math.cos(terms.swing) - np.array(at.swings)) * legs)]
+    at_home = np.array([at.home.lengths[i] for i in (0, 3, 0, 1, 2, 3)])
+    missed += [*((math.cos(terms.swing) - np.array(at.swings)) * legs / at_home)]
     largest = np.array([each.max() for each in missed])
     assert (largest <= found.bounds + 1e-12).all()
     assert (found.values <= found.bounds + 1e-12).all()
