@@ -23,9 +23,9 @@ from explorer.numerics.arrays import FloatArray
 
 # Signs of errors, up to a common one.
 SIGNS = np.array([*itertools.product((1.0, -1.0), repeat=5)])
-# Shares by which poses of a search keep their demands, so that poses between them keep these too:
-# near in the variables, or with steep values.
-NEAR, STEEP = 1e-4, 2e-2
+# Shares by which poses of a search keep their demands, so that poses between them keep these too,
+# and so that they can be proven: of limits over tilts, and of all others.
+NEAR, STEEP = 1e-4, 0.05
 
 
 class Demand(NamedTuple):
@@ -127,7 +127,7 @@ def _clearances(terms: Terms) -> Iterator[Demand]:
             terms.scale_mm,
             -terms.requirement.legs.diameter_mm,
             is_least=True,
-            reserve=100.0 * NEAR * terms.distance,
+            reserve=STEEP * terms.distance,
         )
 
 

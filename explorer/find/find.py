@@ -43,8 +43,8 @@ RELAXED_SECONDS = 3.0
 NEAREST_SECONDS = 2.0
 # Factor on the seconds after which a search ends on a slow machine all the same.
 PATIENCE = 4.0
-# Rounds of an improvement and a certificate, and cells of poses of the latter.
-ROUNDS, CELLS, FINAL_CELLS = 8, 4000, 20_000
+# Rounds of an improvement and a certificate, and most cells of poses of the latter.
+ROUNDS, CELLS = 8, 4000
 # Azimuths of the tilts in whose nearest places an improvement looks.
 AZIMUTHS = 16
 # Amount of a miss between the poses up to which the next round leaves as much to spare.
@@ -237,7 +237,7 @@ class Search:
         for kind, found in list(self.best.items()):
             last: Machine | None = found
             while last is not None:
-                certificate = certify(last.x, self.terms, cells=FINAL_CELLS)
+                certificate = certify(last.x, self.terms)
                 if certificate.is_kept:
                     self.best[kind] = replace(last, certificate=certificate)
                     break

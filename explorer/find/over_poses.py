@@ -40,8 +40,6 @@ def prove_demand(
     At most some number of cells is looked at.
     """
     lows, highs = ends_of(terms)
-    arm = float(np.abs(x[m.B1X : m.HX]).max())
-    scales = np.array([*0.5 * terms.edges, math.sin(terms.tilt) * arm, arm])
 
     def measure(lows: FloatArray, highs: FloatArray) -> CellValues:
         middle = 0.5 * (lows + highs)
@@ -51,7 +49,7 @@ def prove_demand(
         return CellValues(values, np.broadcast_to(middle[:, None], (*values.shape, 5)), bounds)
 
     most = most or MOST_CELLS
-    return largest_values(measure, lows, highs, most=most, scales=scales, resolves=False)
+    return largest_values(measure, lows, highs, most=most, along_one=True, resolves=False)
 
 
 def ends_of(terms: Terms) -> tuple[FloatArray, FloatArray]:

@@ -1,8 +1,8 @@
 """The largest values of functions over a box, by bounds over cells.
 
 Of each cell, values that are attained in it and upper bounds of all its values are computed. Cells
-of which a bound exceeds what is asked, or the largest value found, are divided in halves along
-every axis.
+of which a bound exceeds what is asked, or the largest value found, are halved along every axis, or
+along the one that lowers the bounds most.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, IntArray
 
 # Cells that are measured at once, and the most cells of a search.
 BATCH, MOST = 4096, 200_000
 # Share by which the bound of an excess may exceed the largest one attained.
 LOOSE = 1e-3
+# Cells with which an axis is chosen, and excess of a bound from which on all count as the same.
+TRIES, FAR = 8, 10.0
 
 
 class CellValues(NamedTuple):
@@ -56,8 +58,8 @@ def largest_values(
     highs: FloatArray,
     enough: float = 0.0,
     most: int = MOST,
-    scales: FloatArray | None = None,
     *,
+    along_one: bool = False,
     resolves: bool = True,
 ) -> CellValues:
     """Return the largest values of m functions over a box, without the axis of the cells.
@@ -72,23 +74,23 @@ def largest_values(
             it. Above, it ends where the bound exceeds the level by little more than the largest
             value does.
         most: Largest number of cells.
-        scales: Weights of the axes, shape (k,): the longest edge alone is halved at a time; None to
-            halve all.
+        along_one: Whether cells are halved along one axis at a time, which saves cells where they
+            have many axes, rather than along all of them.
         resolves: Whether cells are divided for values above the level, too.
     """
-    size = highs - lows
-    low, left, found = lows[None], most, None
+    size, low, left = highs - lows, lows[None], most
+    found, least = None, np.zeros(0)
     while found is None or len(low):
-        divided = size > 0.0
-        if scales is not None:
-            divided &= np.arange(len(size)) == (size * scales).argmax()
-        halves = np.array(
-            [*itertools.product(*((0.0, 0.5) if each else (0.0,) for each in divided))]
-        )
-        low = (low[:, None] + size * halves).reshape(-1, len(size))
-        size = np.where(divided, 0.5 * size, size)
-        parts = np.array_split(low, 1 + len(low) // BATCH)
-        measured = [measure(part, np.minimum(part + size, highs)) for part in parts]
+        axes = np.flatnonzero(size)
+        if along_one and found is not None:
+            axes = axes[[_best_axis(measure, low, size, axes, least)]]
+        half = size.copy()
+        half[axes] *= 0.5
+        for axis in axes:
+            low = np.concatenate([low, low + np.where(np.arange(len(size)) == axis, half, 0.0)])
+        size = half
+        batches = np.array_split(low, 1 + len(low) // BATCH)
+        measured = [measure(each, np.minimum(each + size, highs)) for each in batches]
         cells = CellValues(*map(np.concatenate, zip(*measured, strict=True)))
         rows = cells.values.argmax(axis=0)
         columns = np.arange(len(rows))
@@ -100,8 +102,28 @@ def largest_values(
         if not resolves:
             least[best > enough] = np.inf
         divides, left = np.any(cells.bounds > least, axis=1), left - len(low)
-        divides &= size.any() and len(halves) * np.count_nonzero(divides) <= left
+        parts = 2 if along_one else 2 ** len(axes)
+        divides &= size.any() and parts * np.count_nonzero(divides) <= left
         bounds = np.where(divides[:, None], -np.inf, cells.bounds).max(axis=0)
         bounds = np.maximum(worst.bounds, bounds)
         found, low = worst._replace(bounds=np.maximum(bounds, best)), low[divides]
     return found
+
+
+def _best_axis(
+    measure: Callable[[FloatArray, FloatArray], CellValues],
+    low: FloatArray,
+    size: FloatArray,
+    axes: IntArray,
+    least: FloatArray,
+) -> int:
+    """Return which of some axes lowers the bounds of a few cells most towards levels (m,)."""
+    few = low[:: 1 + len(low) // TRIES]
+    lows, highs = list[FloatArray](), list[FloatArray]()
+    for axis in axes:
+        half = np.where(np.arange(len(size)) == axis, 0.5 * size, 0.0)
+        lows += [few, few + half]
+        highs += [few + size - half, few + size]
+    bounds = measure(np.concatenate(lows), np.concatenate(highs)).bounds
+    above = np.where(bounds > least, np.minimum(bounds - least, FAR), 0.0)
+    return int(above.reshape(len(axes), -1).sum(axis=1).argmin())

@@ -16,8 +16,9 @@ def waves(rng: np.random.Generator, axes: int) -> tuple[FloatArray, FloatArray]:
 
 @pytest.mark.parametrize("axes", [1, 2, 3])
 @pytest.mark.parametrize("enough", [-10.0, 1.0])
+@pytest.mark.parametrize("along_one", [False, True])
 def test_largest_values_lie_between_what_is_attained_and_the_bound(
-    axes: int, enough: float
+    axes: int, enough: float, *, along_one: bool
 ) -> None:
     rng = np.random.default_rng(axes)
     size, wave = waves(rng, axes)
@@ -37,7 +38,7 @@ def test_largest_values_lie_between_what_is_attained_and_the_bound(
         return CellValues(values, np.repeat(middles[:, None], 3, axis=1), bounds)
 
     lows, highs = np.full(axes, -1.0), np.ones(axes)
-    found = largest_values(measure, lows, highs, enough)
+    found = largest_values(measure, lows, highs, enough, along_one=along_one)
     sampled = values_at(rng.uniform(lows, highs, (200_000, axes))).max(axis=0)
     assert (found.bounds >= sampled).all()
     assert found.values == pytest.approx(np.diagonal(values_at(found.places)), abs=1e-12)
