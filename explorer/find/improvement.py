@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from explorer.find import machine_values as m
+from explorer.find.certificate import lengths_over
 from explorer.find.demands import demands_of, limits_of
 from explorer.find.requirement import Preference
 from explorer.find.terms import ROOM, Parts, Terms, part_slacks
@@ -35,6 +36,18 @@ PRECISION = 1e-7
 LENGTH, FORCE, STIFFNESS, ERROR, SINGULAR, CLEARANCE = range(6)
 """What preferences lower: the longest leg; the largest force, the compliance and the error of the
 tool for equal actuators; one over the transmission index; one over the least distance of legs."""
+
+LOWERED: Mapping[int, Callable[[m.MachineValues], list[Any]]] = MappingProxyType(
+    {
+        # The rate of leg 1 does not move a tool at b4.
+        FORCE: lambda at: [0.5 * np.log(each * each + 1e-9) for each in at.tool_speeds],
+        STIFFNESS: lambda at: [np.log(sum(each * each for each in at.tool_speeds))],
+        ERROR: lambda at: [np.log(sum(at.tool_speeds))],
+        SINGULAR: lambda at: [-np.log(each) for each in at.transmissions],
+        CLEARANCE: lambda at: [-np.log(m.size(each)) for each in at.distances],
+    }
+)
+"""The logarithms of these quantities, but for the longest leg."""
 
 WEIGHTS: Mapping[Preference, Mapping[int, float]] = MappingProxyType(
     {
@@ -117,7 +130,8 @@ class Improvement:
             rows += [-each - demand.reserve - self.spare for each in demand.missed(at)]
         if terms.parts is not None:
             rows += self._parts(terms.parts, shortest, at)
-        rows += self._preferred(at, bounds.T[5:, :, None])
+        for kind, bound in zip(self.extra, bounds.T[5:, :, None], strict=True):
+            rows += [bound - each for each in LOWERED[kind](at)]
         shape = (len(x), len(poses))
         return np.stack([np.broadcast_to(row, shape) for row in rows], axis=1)
 
@@ -127,44 +141,13 @@ class Improvement:
         pairs = zip(at.lengths, shortest, (1.0 + ROOM) * parts.dead, strict=True)
         return rows + [2.0 * short - dead - each for each, short, dead in pairs]
 
-    def _preferred(self, at: m.MachineValues, bounds: FloatArray) -> list[FloatArray]:
-        """Return the slacks of what the preference lowers below their bounds, as logarithms."""
-        rows: list[FloatArray] = []
-        for kind, bound in zip(self.extra, bounds, strict=True):
-            speeds = at.tool_speeds
-            match kind:
-                case 1:
-                    # The rate of leg 1 does not move a tool at b4.
-                    rows += [bound - 0.5 * np.log(each * each + 1e-9) for each in speeds]
-                case 2:
-                    rows.append(bound - np.log(sum(each * each for each in speeds)))
-                case 3:
-                    rows.append(bound - np.log(sum(speeds)))
-                case 4:
-                    rows += [bound + np.log(each) for each in at.transmissions]
-                case _:
-                    rows += [bound + np.log(m.size(each)) for each in at.distances]
-        return rows
-
     def _first_bounds(self, x: FloatArray, poses: FloatArray) -> FloatArray:
         """Return the least bounds that one machine keeps in poses, shape (5 + extra,)."""
-        none = np.zeros((1, 5 + len(self.extra)))
+        at = self.terms.values(x, poses)
+        lengths = lengths_over(x, self.terms, poses)
         with np.errstate(all="ignore"):
-            table = self.table(x[None], poses, none)[0].min(axis=1)
-            preferred = self._preferred(self.terms.values(x[None], poses), none.T[5:, :, None])
-        lengths = [-float(table[4 + leg]) for leg in range(4)]
-        worst = [-float(np.min(each)) for each in preferred]
-        return np.array([*table[:4], max(lengths), *self._group(worst)])
-
-    def _group(self, worst: list[float]) -> list[float]:
-        """Return the largest of the rows of each preferred quantity."""
-        found: list[float] = []
-        start = 0
-        for kind in self.extra:
-            count = 1 if kind in (STIFFNESS, ERROR) else 6
-            found.append(max(worst[start : start + count]))
-            start += count
-        return found
+            preferred = [float(np.max(np.stack(LOWERED[kind](at)))) for kind in self.extra]
+        return np.array([*lengths[:, 0], lengths[:, 1].max(), *preferred])
 
     def run(self, poses: FloatArray, *, rounds: int = 20) -> Improved:
         """Return the machine after the solver's rounds, and what it still misses at the poses.

@@ -21,7 +21,7 @@ from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.demands import RESERVE, Measured, SearchDemand
+from explorer.optimise.search.demands import RESERVE, Measured
 from explorer.optimise.search.state import SearchState
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
@@ -40,6 +40,8 @@ FAR = 1e3
 # Tolerance of a clearance that is missed, over the demanded one.
 BETWEEN = 0.1
 
+# Names of the demands of the pairs.
+NAMES = tuple(f"clearance of legs {first} and {second}" for first, second in PAIRS)
 # The legs of each pair from 0.
 LEGS = np.array(PAIRS) - 1
 # Parameters that move the ends of legs while p stays.
@@ -93,10 +95,8 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
     return positions[within & clear]
 
 
-class ClearanceDemand(SearchDemand):
+class ClearanceDemand:
     """The least clearance of each pair, in design units, over some positions (k, 3)."""
-
-    names = tuple(f"clearance of legs {first} and {second}" for first, second in PAIRS)
 
     def __init__(self, clearance: float, positions: FloatArray) -> None:
         self.clearance, self.positions = clearance, positions
@@ -127,7 +127,7 @@ class ClearanceDemand(SearchDemand):
         kept = np.maximum(spare, outside.max(axis=0)[:, None])
         least = kept.min(axis=0, initial=FAR * state.problem.size) / self.clearance
         pair = int(least.argmin())
-        return float(least[pair]), self.names[pair]
+        return float(least[pair]), NAMES[pair]
 
     def look_at_unproven(self, state: SearchState) -> list[UnprovenClearance]:
         """Look from now on at where pairs come nearest too, and return those not proven apart."""
@@ -141,7 +141,7 @@ class ClearanceDemand(SearchDemand):
         attained = least.position[np.isfinite(least.clearance)]
         self.positions = np.vstack([self.positions, attained])
         return [
-            UnprovenClearance(self.names[pair], float(missed[pair]), least.position[pair])
+            UnprovenClearance(NAMES[pair], float(missed[pair]), least.position[pair])
             for pair in np.flatnonzero(np.maximum(missed, bounds) > 0.0)
         ]
 

@@ -6,7 +6,7 @@ exactly zero for an equality. All are measured at a `SearchState`.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -32,94 +32,75 @@ class Measured(NamedTuple):
     gradients: FloatArray
 
 
-class SearchDemand(ABC):
+class SearchDemand(NamedTuple):
     """One or several conditions of one kind.
 
     Attributes:
         names: Name of each condition.
+        measure: Function that returns the values and their derivatives in a state.
         is_equality: Whether the values must be zero, rather than at least zero.
         is_limit: Whether it is a limit of the design, with the tolerance of all limits.
     """
 
-    names: tuple[str, ...] = ()
-    is_equality = False
-    is_limit = False
-
-    @abstractmethod
-    def measure(self, state: SearchState) -> Measured:
-        """Return the values and their derivatives."""
+    names: tuple[str, ...]
+    measure: Callable[[SearchState], Measured]
+    is_equality: bool = False
+    is_limit: bool = False
 
 
-class VolumeDemand(SearchDemand):
-    """The volume of the workspace, exactly or at least, by its nearly linear cube root."""
+def volume_demand(volume: float, *, is_equality: bool) -> SearchDemand:
+    """Return (V / V′)^⅓ − 1 of the volume, exactly zero or at least: it is nearly linear."""
 
-    def __init__(self, volume: float, *, is_equality: bool) -> None:
-        self.volume, self.is_equality = volume, is_equality
-        self.names = (CATALOGUE["volume"].label,)
-
-    def measure(self, state: SearchState) -> Measured:
-        """Return (V / V′)^⅓ − 1."""
-        root, gradient = state.volume_root(self.volume)
+    def measure(state: SearchState) -> Measured:
+        root, gradient = state.volume_root(volume)
         return Measured(np.array([root - 1.0]), gradient[None, :])
 
+    return SearchDemand((CATALOGUE["volume"].label,), measure, is_equality=is_equality)
 
-class ReachDemand(SearchDemand):
-    """A longest leg of at most some length."""
 
-    def __init__(self, reach: float) -> None:
-        self.reach = reach
-        self.names = (CATALOGUE["longest_leg"].label,)
+def reach_demand(reach: float) -> SearchDemand:
+    """Return 1 − longest leg / reach."""
 
-    def measure(self, state: SearchState) -> Measured:
-        """Return 1 − reach / largest."""
+    def measure(state: SearchState) -> Measured:
         value, gradient = state.longest_leg
-        return Measured(np.array([1.0 - value / self.reach]), -gradient[None, :] / self.reach)
+        return Measured(np.array([1.0 - value / reach]), -gradient[None, :] / reach)
+
+    return SearchDemand((CATALOGUE["longest_leg"].label,), measure)
 
 
-class DegenerateDemand(SearchDemand):
-    """The distances from degenerate designs, on the side where a run starts.
+def side_demands(start: SearchState) -> list[SearchDemand]:
+    """Return the demands that a design lies on the same sides as a start, by some distance.
 
-    They are linear, so no step of the solver breaks them after a start that keeps them.
+    They are the distances from degenerate designs, which are linear, so that no step of the solver
+    breaks them after a start that keeps them; and the gap of the carriages. The order of these is
+    no demand: each design keeps that of its own home pose.
     """
+    least, size = start.problem.demands.least, start.problem.size
+    signs, side = np.sign(_distances(start)), 1.0 if _gap(start) >= 0.0 else -1.0
 
-    names = ("distance from a3y = 0", "distance from b1y = 0", "distance from b2 = b3")
-
-    def __init__(self, least: float, start: SearchState) -> None:
-        self.least = least
-        self.signs = np.sign(_distances(start))
-
-    def measure(self, state: SearchState) -> Measured:
-        """Return sign · distance − least, over the size of the start."""
-        size = state.problem.size
+    def measure_distances(state: SearchState) -> Measured:
         rows = state.rows(("a3y", "b1y", "b3"))
         rows[2] -= state.rows(("b2",))[0]
-        values = self.signs * _distances(state) - self.least
-        return Measured(values / size, self.signs[:, None] * rows / size)
+        values = signs * _distances(state) - least
+        return Measured(values / size, signs[:, None] * rows / size)
+
+    def measure_gap(state: SearchState) -> Measured:
+        u, span = state.rotation[:, 0], state.design.b3 - state.design.b2
+        slope = state.along({"b3": float(u[0]), "b2": -float(u[0]), YAW: -span * float(u[1])})
+        value = side * _gap(state) - state.design.limits.gap
+        return Measured(np.array([value / size]), side * slope[None, :] / size)
+
+    found: list[SearchDemand] = []
+    if least > 0.0:
+        names = "distance from a3y = 0", "distance from b1y = 0", "distance from b2 = b3"
+        found.append(SearchDemand(names, measure_distances))
+    if start.design.limits.gap > 0.0:
+        found.append(SearchDemand((GAP,), measure_gap, is_limit=True))
+    return found
 
 
 def _distances(state: SearchState) -> FloatArray:
     return np.array([*distances_of(state.design).values()])
-
-
-class GapDemand(SearchDemand):
-    """The smallest gap of the carriages, in the order that they have where a run starts.
-
-    The order itself is no demand: each design keeps that of its own home pose.
-    """
-
-    is_limit = True
-    names = (GAP,)
-
-    def __init__(self, start: SearchState) -> None:
-        self.sign = 1.0 if _gap(start) >= 0.0 else -1.0
-
-    def measure(self, state: SearchState) -> Measured:
-        """Return sign · (d3 − d1) − gap, over the size of the start."""
-        size, u = state.problem.size, state.rotation[:, 0]
-        span = state.design.b3 - state.design.b2
-        slope = state.along({"b3": float(u[0]), "b2": -float(u[0]), YAW: -span * float(u[1])})
-        value = self.sign * _gap(state) - state.design.limits.gap
-        return Measured(np.array([value / size]), self.sign * slope[None, :] / size)
 
 
 def _gap(state: SearchState) -> float:

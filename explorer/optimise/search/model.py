@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,18 +54,24 @@ class SearchModel:
         self._before_each = before_each
         u = np.array(start) / scales(problem)
         here = SearchState(problem, u)
-        self.demands: list[demands.SearchDemand] = [*_demands(problem, here)]
+        wanted, is_matched = problem.demands, problem.objective == "match-volume"
+        self.demands: list[demands.SearchDemand] = []
+        if wanted.volume is not None:
+            self.demands.append(demands.volume_demand(wanted.volume, is_equality=is_matched))
+        if wanted.reach is not None:
+            self.demands.append(demands.reach_demand(wanted.reach))
+        self.demands += demands.side_demands(here)
         self._clearance: clearance_demand.ClearanceDemand | None = None
-        clearance = problem.demands.clearance
-        if clearance is not None:
+        if wanted.clearance is not None:
             positions = clearance_demand.first_positions(problem, here.design)
-            self._clearance = clearance_demand.ClearanceDemand(clearance, positions)
+            self._clearance = clearance_demand.ClearanceDemand(wanted.clearance, positions)
             if not is_relaxed:
-                self.demands.append(self._clearance)
+                names = clearance_demand.NAMES
+                self.demands.append(demands.SearchDemand(names, self._clearance.measure))
         self.start: FloatArray = u
         self.bounds = bounds_of(problem)
         """Lows and highs of the scaled variables, shape (n, 2)."""
-        self._volume = problem.demands.volume or here.volume or problem.size**3
+        self._volume = wanted.volume or here.volume or problem.size**3
         self._last: Evaluation | None = None
         self.evaluations = 0
 
@@ -171,16 +177,3 @@ def reported_objective(problem: Problem, state: SearchState) -> float:
             return state.longest_leg[0]
         case "largest-volume":
             return state.volume
-
-
-def _demands(problem: Problem, start: SearchState) -> Iterator[demands.SearchDemand]:
-    """Yield the demands of a problem but its clearance."""
-    wanted, is_matched = problem.demands, problem.objective == "match-volume"
-    if wanted.volume is not None:
-        yield demands.VolumeDemand(wanted.volume, is_equality=is_matched)
-    if wanted.reach is not None:
-        yield demands.ReachDemand(wanted.reach)
-    if wanted.least > 0.0:
-        yield demands.DegenerateDemand(wanted.least, start)
-    if start.design.limits.gap > 0.0:
-        yield demands.GapDemand(start)

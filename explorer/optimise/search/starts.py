@@ -14,7 +14,7 @@ import numpy as np
 from explorer.errors import DesignError, InputError
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import Problem, distances_of
-from explorer.optimise.search.demands import DegenerateDemand, GapDemand
+from explorer.optimise.search.demands import side_demands
 from explorer.optimise.search.model import MISSED, SearchModel
 from explorer.optimise.search.sqp import Point, slsqp
 from explorer.optimise.search.state import UNBOUNDED, SearchState, bounds_of
@@ -94,11 +94,7 @@ def open_workspace(
     here, size, n = SearchState(problem, start), problem.size, len(start)
     volume = problem.demands.volume
     radius = ROOM * (size if volume is None else volume ** (1.0 / 3.0))
-    sides: list[DegenerateDemand | GapDemand] = []
-    if problem.demands.least > 0.0:
-        sides.append(DegenerateDemand(problem.demands.least, here))
-    if here.design.limits.gap > 0.0:
-        sides.append(GapDemand(here))
+    sides = side_demands(here)
     names = [*here.regions]
     labels = [*names, *(name for side in sides for name in side.names)]
     first = np.concatenate([start, _least_broken(here) / size])
