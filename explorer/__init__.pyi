@@ -12,6 +12,7 @@ from .errors import (
 )
 from .find.check import check_requirement as check_requirement
 from .find.find import find_designs as find_designs
+from .find.nearest import nearest_values as nearest_values
 from .find.requirement import (
     Requirement as Requirement,
     load_requirement as load_requirement,

@@ -86,6 +86,11 @@ class Meter(AbstractContextManager["Meter"]):
         if self._last_width and self.is_terminal:
             write_progress("\r" + " " * self._last_width + "\r")
 
+    def tell(self, line: str) -> None:
+        """Write a line that stays, above the bar."""
+        erased = "\r" + " " * self._last_width + "\r" if self.is_terminal else ""
+        write_progress(f"{erased}{line}\n")
+
     def show(self, text: str, share: float) -> None:
         """Show a line beside a bar of the completed share, unless the last update is too recent."""
         pause = IN_TERMINAL if self.is_terminal else ELSEWHERE

@@ -127,7 +127,7 @@ class FoundDesigns:
             requirement; 0 if nothing is known.
         impossible: Clauses on demands that no machine keeps, proven; () if there are none.
         binding: Names of the demands that bound the best design, or that were missed.
-        nearest: For demands that bind, the nearest values that can be reached.
+        nearest: The nearest values, as far as `nearest_values` was asked for them.
         status: "found", "none" (searched in vain), "impossible" or "cancelled".
     """
 

@@ -16,14 +16,13 @@ from dataclasses import dataclass, field, replace
 import msgspec
 import numpy as np
 
-from explorer.find.answers import FoundDesign, FoundDesigns, Relaxation
+from explorer.find.answers import FoundDesign, FoundDesigns
 from explorer.find.bound import impossible_demands, least_longest_mm
 from explorer.find.candidates import candidates, standard_poses
 from explorer.find.certificate import Certificate, certify, is_regular, lengths_over
 from explorer.find.check import check_machine
 from explorer.find.demands import demands_of
 from explorer.find.improvement import Improvement, free_variables
-from explorer.find.nearest import nearest_values, relaxable_fields
 from explorer.find.over_tilts import nearest_poses
 from explorer.find.requirement import PREFERENCES, Preference, Requirement
 from explorer.find.terms import Terms, design_of, row_of
@@ -37,10 +36,6 @@ from explorer.prototype.fitting import buildability
 UNITS_PER_SECOND = 250.0
 # Units of a block of candidates, of one evaluation of a machine, and of a certificate.
 BLOCK_UNITS, EVALUATION_UNITS, CERTIFICATE_UNITS = 50.0, 1.0, 20.0
-# Seconds of a search for a relaxed requirement.
-RELAXED_SECONDS = 3.0
-# Seconds of the search for nearest values for each second of a search.
-NEAREST_SECONDS = 2.0
 # Factor on the seconds after which a search ends on a slow machine all the same.
 PATIENCE = 4.0
 # Rounds of an improvement and a certificate, and most cells of poses of the latter.
@@ -72,7 +67,7 @@ class Machine:
     x: FloatArray
     certificate: Certificate
     cost: float
-    kind: Preference
+    kind: str
     poses: FloatArray
 
 
@@ -91,13 +86,13 @@ class Search:
     """
 
     terms: Terms
-    kinds: tuple[Preference, ...]
+    kinds: tuple[str, ...]
     units: float
     ends: float
     stop: Callable[[], bool]
     seed: int
     enough: float = 0.0
-    best: dict[Preference, Machine] = field(default_factory=dict[Preference, Machine])
+    best: dict[str, Machine] = field(default_factory=dict[str, Machine])
     done: float = 0.0
     is_cancelled: bool = False
 
@@ -139,9 +134,7 @@ class Search:
         self.best[found.kind] = found
         return True
 
-    def _starts(
-        self, start: FloatArray | None
-    ) -> Iterator[tuple[FloatArray, Preference] | Machine]:
+    def _starts(self, start: FloatArray | None) -> Iterator[tuple[FloatArray, str] | Machine]:
         """Yield kinds and machines to improve, without an end."""
         random = np.random.default_rng(self.seed + 1)
         if start is not None:
@@ -198,7 +191,7 @@ class Search:
         moved[free] += random.choice(SHAKES) * random.normal(size=len(free))
         return moved
 
-    def improve(self, x: FloatArray, kind: Preference) -> Machine | None:
+    def improve(self, x: FloatArray, kind: str) -> Machine | None:
         """Return the machine after an improvement, certified; None if it misses a demand."""
         poses = standard_poses(self.terms.tilt)
         ranges = lengths_over(x, self.terms, poses)
@@ -206,7 +199,7 @@ class Search:
         return self._improve(x, kind, first, poses)
 
     def _improve(
-        self, x: FloatArray, kind: Preference, found: Certificate, poses: FloatArray
+        self, x: FloatArray, kind: str, found: Certificate, poses: FloatArray
     ) -> Machine | None:
         azimuths = np.linspace(-math.pi, math.pi, AZIMUTHS + 1)[1:]
         tilts = np.array([(0.0, 0.0), *((each, self.terms.tilt) for each in azimuths)])
@@ -221,7 +214,7 @@ class Search:
             if improved.missed > NEARLY or not is_regular(x):
                 return None
             self.spend(CERTIFICATE_UNITS)
-            found = certify(x, self.terms, cells=CELLS, poses=poses, is_quick=True)
+            found = self.certify(x, poses)
             if found.is_kept:
                 is_built = self.terms.parts is None or fits(x, self.terms, found)
                 return Machine(x, found, improved.cost, kind, poses) if is_built else None
@@ -230,6 +223,10 @@ class Search:
             if crossed.any():
                 return None
         return None
+
+    def certify(self, x: FloatArray, poses: FloatArray) -> Certificate:
+        """Return the certificate of an improved machine, quick if it misses a limit."""
+        return certify(x, self.terms, cells=CELLS, poses=poses, is_quick=True)
 
     def finish(self) -> None:
         """Certify the best machines with more cells; improve those again that miss a demand."""
@@ -260,7 +257,7 @@ def find_designs(
     watch: Callable[[FoundDesigns], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> FoundDesigns:
-    """Search for designs that keep a requirement.
+    """Search for designs that keep a requirement; refuse at once what no machine keeps.
 
     With the same seed and the same seconds the designs are the same, unless the machine is so slow
     that the search ends by the clock.
@@ -290,15 +287,11 @@ def find_designs(
     bound, impossible = least_longest_mm(bounded), impossible_demands(bounded)
     kinds = tuple(dict.fromkeys((preferred, *OTHER_KINDS)))[:count]
     if impossible:
-        refused = FoundDesigns((), bound, impossible, status="impossible")
-        if watch:
-            watch(refused)
-        nearest = _nearest(requirement, seed, seconds, stop or _never)
-        return replace(refused, nearest=nearest)
+        return FoundDesigns((), bound, impossible, status="impossible")
     start = None if design is None else row_of(design, terms)
     ends = time.perf_counter() + PATIENCE * seconds
     units = UNITS_PER_SECOND * seconds
-    search = Search(terms, kinds, units, ends, stop or _never, seed)  # type: ignore[arg-type]
+    search = Search(terms, kinds, units, ends, stop or _never, seed)
 
     def so_far() -> FoundDesigns:
         found = [search.best[kind] for kind in search.kinds if kind in search.best]
@@ -308,47 +301,8 @@ def find_designs(
 
     search.run(start, lambda: watch(so_far()) if watch else None)
     search.finish()
-    found = so_far()
-    if found.designs:
-        return found
-    if search.is_cancelled:
-        return FoundDesigns((), bound, status="cancelled")
-    nearest = _nearest(requirement, seed, seconds, stop or _never)
-    binding = tuple(each.words for each in nearest)
-    return FoundDesigns((), bound, (), binding, nearest, "none")
-
-
-def _nearest(
-    requirement: Requirement, seed: int, seconds: float, stop: Callable[[], bool]
-) -> tuple[Relaxation, ...]:
-    """Return the nearest values of demands, as many as are found in about the given seconds."""
-    found, left = list[Relaxation](), [UNITS_PER_SECOND * NEAREST_SECONDS * seconds]
-    for name in relaxable_fields(requirement):
-        last: list[FloatArray] = []
-
-        def keeps(relaxed: Requirement, is_thorough: bool, last: list[FloatArray] = last) -> float:
-            if impossible_demands(relaxed) or (left[0] <= 0.0 and not last):
-                return math.inf
-            allowed = min(seconds, RELAXED_SECONDS) * (3.0 if is_thorough else 1.0)
-            # What was found last is certified even if no more work is left.
-            units = max(min(UNITS_PER_SECOND * allowed, left[0]), 5.0 * CERTIFICATE_UNITS)
-            ends, enough = (
-                time.perf_counter() + PATIENCE * allowed,
-                0.0 if is_thorough else math.inf,
-            )
-            search = Search(Terms.of(relaxed), ("small",), units, ends, stop, seed, enough)
-            search.run(last[-1] if last else None, lambda: None)
-            left[0] -= search.done + CERTIFICATE_UNITS
-            best = search.best.get("small")
-            if best is None:
-                return math.inf
-            last.append(best.x)
-            return float(search.terms.scale_mm * best.certificate.ranges[:, 1].max())
-
-        if stop() or left[0] <= 0.0:
-            break
-        found += nearest_values(requirement, [name], keeps)
-    return tuple(found)
+    found, status = so_far(), "cancelled" if search.is_cancelled else "none"
+    return found if found.designs else replace(found, status=status)
 
 
 def fits(x: FloatArray, terms: Terms, certificate: Certificate) -> bool:

@@ -7,8 +7,8 @@ preference lowers: they stay beyond all values at the poses, which keeps the fun
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -33,9 +33,10 @@ LEAST = 0.04
 FARTHEST = 8.0
 PRECISION = 1e-7
 
-LENGTH, FORCE, STIFFNESS, ERROR, SINGULAR, CLEARANCE = range(6)
-"""What preferences lower: the longest leg; the largest force, the compliance and the error of the
-tool for equal actuators; one over the transmission index; one over the least distance of legs."""
+LENGTH, FORCE, STIFFNESS, ERROR, SINGULAR, CLEARANCE, RATIO, MISS = range(8)
+"""What is lowered: the longest leg; the largest force, the compliance and the error of the tool for
+equal actuators; one over the transmission index; one over the least distance of legs; the largest
+ratio of the lengths of a leg; the amount by which one demand is missed."""
 
 LOWERED: Mapping[int, Callable[[m.MachineValues], list[Any]]] = MappingProxyType(
     {
@@ -61,6 +62,25 @@ WEIGHTS: Mapping[Preference, Mapping[int, float]] = MappingProxyType(
     }
 )
 """Exponents of the quantities whose product a preference makes least."""
+
+RELAXED: Mapping[str, str] = MappingProxyType(
+    {
+        "swing_deg": "swing",
+        "legs.push_n": "force",
+        "legs.apart_mm": "clearance",
+        "legs.speed_mm_s": "speed",
+        "transmission": "transmission index",
+        "error_mm": "error",
+        "deflection_mm": "deflection",
+    }
+)
+"""Fields of a requirement with the demands that they limit."""
+
+GROWING = MappingProxyType({"tilt_deg": m.TILT, "box_mm": m.SIZE})
+"""Fields of a requirement with the variables that are factors on them."""
+
+# Weight of the longest leg beside a demand that is missed as little as possible.
+BESIDE = 0.02
 
 
 @dataclass(frozen=True)
@@ -92,22 +112,35 @@ class Improvement:
     """A requirement and a preference as the functions of an SQP solver, from a machine on.
 
     The demands are looked at in poses; each round takes those that a machine nearly misses. Each
-    demand has an amount to spare, over the diagonal of the box or over its limit.
+    demand has an amount to spare, over the diagonal of the box or over its limit. In place of a
+    preference a field of the requirement may be given: its demand is then missed as little as the
+    others allow.
     """
 
     def __init__(
         self,
         terms: Terms,
-        preference: Preference,
+        aim: str,
         start: FloatArray,
         before_each: Callable[[], None] = lambda: None,
         spare: float = 0.0,
     ) -> None:
-        self.terms, self.weights, self.start = terms, WEIGHTS[preference], start
-        self.demands = [*limits_of(terms), *demands_of(terms)]
+        every, self.spare, self.start = [*limits_of(terms), *demands_of(terms)], spare, start
+        self.relaxed = [each for each in every if each.name == RELAXED.get(aim)]
+        self.demands = [each for each in every if each.name != RELAXED.get(aim)]
+        self.factor = GROWING.get(aim)
+        weights: dict[str, Mapping[int, float]] = {**WEIGHTS, "legs.longest_mm": {LENGTH: 1.0}}
+        if aim in weights:
+            self.weights = weights[aim]
+        else:
+            own = {MISS: 1.0} if self.relaxed else {RATIO: 1.0} if aim == "legs.ratio" else {}
+            self.weights = {LENGTH: BESIDE} | own
+        longest = math.inf if aim == "legs.longest_mm" else terms.longest
+        ratio = math.inf if aim == "legs.ratio" else terms.ratio
+        self.terms = replace(terms, longest=longest, ratio=ratio)
         self.sides = terms.values(start, m.HOME).sides
         self.free, self._before_each = free_variables(terms), before_each
-        self.spare = spare
+        self.free += [] if self.factor is None else [self.factor]
         self.extra = [each for each in self.weights if each != LENGTH]
 
     def table(self, x: Any, poses: FloatArray, bounds: Any) -> Any:
@@ -123,6 +156,8 @@ class Improvement:
         shortest, longest = bounds.T[:4, :, None], bounds.T[4, :, None]
         rows = [length - short for length, short in zip(at.lengths, shortest, strict=True)]
         rows += [longest - length for length in at.lengths]
+        if math.isfinite(terms.longest):
+            rows.append(terms.longest * (1.0 - RESERVE) - longest)
         if math.isfinite(terms.ratio):
             ratio = terms.ratio * (1.0 - RESERVE - self.spare)
             rows += [ratio * short - each for each, short in zip(at.lengths, shortest, strict=True)]
@@ -130,8 +165,8 @@ class Improvement:
             rows += [-each - demand.reserve - self.spare for each in demand.missed(at)]
         if terms.parts is not None:
             rows += self._parts(terms.parts, shortest, at)
-        for kind, bound in zip(self.extra, bounds.T[5:, :, None], strict=True):
-            rows += [bound - each for each in LOWERED[kind](at)]
+        for bound, each in zip(bounds.T[5:, :, None], self._lowered(at, shortest), strict=True):
+            rows += [bound - value for value in each]
         shape = (len(x), len(poses))
         return np.stack([np.broadcast_to(row, shape) for row in rows], axis=1)
 
@@ -141,13 +176,28 @@ class Improvement:
         pairs = zip(at.lengths, shortest, (1.0 + ROOM) * parts.dead, strict=True)
         return rows + [2.0 * short - dead - each for each, short, dead in pairs]
 
+    def _lowered(self, at: m.MachineValues, shortest: Any) -> Iterator[list[Any]]:
+        """Yield the values of each quantity that is lowered beside the longest leg.
+
+        They are logarithms, but for the amounts by which a demand is missed.
+        """
+        for kind in self.extra:
+            if kind == RATIO:
+                pairs = zip(at.lengths, shortest, strict=True)
+                yield [np.log(each / short) for each, short in pairs]
+            elif kind == MISS:
+                yield [each for demand in self.relaxed for each in demand.missed(at)]
+            else:
+                yield LOWERED[kind](at)
+
     def _first_bounds(self, x: FloatArray, poses: FloatArray) -> FloatArray:
         """Return the least bounds that one machine keeps in poses, shape (5 + extra,)."""
-        at = self.terms.values(x, poses)
-        lengths = lengths_over(x, self.terms, poses)
+        at, lengths = self.terms.values(x, poses), lengths_over(x, self.terms, poses)
+        at.distances, at.sides = at.uncrossed_distances, self.sides
         with np.errstate(all="ignore"):
-            preferred = [float(np.max(np.stack(LOWERED[kind](at)))) for kind in self.extra]
-        return np.array([*lengths[:, 0], lengths[:, 1].max(), *preferred])
+            lowered = self._lowered(at, lengths[:, 0])
+            worst = [float(max(map(np.max, each))) for each in lowered]
+        return np.array([*lengths[:, 0], lengths[:, 1].max(), *worst])
 
     def run(self, poses: FloatArray, *, rounds: int = 20) -> Improved:
         """Return the machine after the solver's rounds, and what it still misses at the poses.
@@ -159,11 +209,12 @@ class Improvement:
         lows, highs = _ranges(self, x)
         free = len(self.free)
         bounds = np.clip(self._first_bounds(x, poses), lows[free:], highs[free:])
-        missed, cost = self.missed(x, poses, bounds), self._cost(bounds)
+        missed, cost = self.missed(x, poses, bounds), self._cost(x, bounds)
         rows = self._worst_rows(x, poses, bounds)
         for turn in range(rounds):
             new_x, new_bounds = self._step(x, bounds, poses, rows, trusted)
-            new_missed, new_cost = self.missed(new_x, poses, new_bounds), self._cost(new_bounds)
+            new_missed = self.missed(new_x, poses, new_bounds)
+            new_cost = self._cost(new_x, new_bounds)
             gain = cost - new_cost + COST_OF_MISSES * (missed - new_missed)
             if gain > 0.0:
                 x, bounds, missed, cost = new_x, new_bounds, new_missed, new_cost
@@ -198,41 +249,49 @@ class Improvement:
         looked = poses[used]
         steps = 1j * STEP * np.eye(n + len(bounds))
 
-        def evaluate(y: FloatArray) -> Point:
+        # The last variable is an amount by which all demands may be missed, at a cost, so that
+        # some step is always open.
+        def evaluate(z: FloatArray) -> Point:
             self._before_each()
+            y, spare = z[:-1], z[-1]
             given = np.concatenate([y[None] + 0j, y + steps])
             machines = np.repeat(x[None] + 0j, len(given), axis=0)
             machines[:, free] = given[:, :n]
             table = self.table(machines, looked, given[:, n:])[:, rows[:, 0], places]
-            slope = np.zeros(len(y))
+            slope = np.zeros(len(z))
             slope[n + 4] = self.weights[LENGTH] / y[n + 4]
-            # Too long a leg costs, so that steps towards shorter ones need not be at the end of it.
-            over = max(0.0, y[n + 4] - self.terms.longest * (1.0 - RESERVE))
-            slope[n + 4] += COST_OF_LENGTH * (over > 0.0)
-            slope[n + 5 :] = [self.weights[kind] for kind in self.extra]
-            cost = self._cost(y[n:]) + COST_OF_LENGTH * over
-            return cost, slope, table[0].real, (table[1:].imag / STEP).T
+            slope[n + 5 : -1] = [self.weights[kind] for kind in self.extra]
+            slope[-1] = COST_OF_MISSES
+            if self.factor is not None:
+                slope[n - 1] = -1.0 / y[n - 1]
+            cost = self._cost(machines[0].real, y[n:]) + COST_OF_MISSES * spare
+            slopes = np.column_stack([(table[1:].imag / STEP).T, np.ones(len(rows))])
+            return cost, slope, table[0].real + spare, slopes
 
         y = np.concatenate([x[free], bounds])
         near = np.full(len(y), math.inf)
         near[:n] = trusted
         lows, highs = _ranges(self, self.start)
         ends = np.column_stack([np.clip(each, lows, highs) for each in (y - near, y + near)])
-        equal = np.zeros(len(rows), dtype=bool)
         with np.errstate(all="ignore"), one_thread():
-            found = slsqp(evaluate, _ignore, y, ends, equal, most=STEPS, precision=PRECISION)
-        y = found if np.isfinite(found).all() else y
+            missed = max(0.0, -float(self.table(x[None], looked, bounds[None])[0].min()))
+            start, ends = np.append(y, missed), np.append(ends, [[0.0, 2.0 * missed + 1.0]], axis=0)
+            equal = np.zeros(len(rows), dtype=bool)
+            found = slsqp(evaluate, _ignore, start, ends, equal, most=STEPS, precision=PRECISION)
+        y = found[:-1] if np.isfinite(found).all() else y
         moved = x.copy()
         moved[free] = y[:n]
         return moved, y[n:]
 
     def cost(self, poses: FloatArray) -> float:
         """Return the cost of the start, with the least bounds that it keeps in poses."""
-        return self._cost(self._first_bounds(self.start, poses))
+        return self._cost(self.start, self._first_bounds(self.start, poses))
 
-    def _cost(self, bounds: FloatArray) -> float:
+    def _cost(self, x: FloatArray, bounds: FloatArray) -> float:
         weights = [self.weights[kind] for kind in self.extra]
-        return self.weights[LENGTH] * math.log(bounds[4]) + float(np.dot(weights, bounds[5:]))
+        growing = 0.0 if self.factor is None else math.log(x[self.factor])
+        cost = self.weights[LENGTH] * math.log(bounds[4]) - growing
+        return cost + float(np.dot(weights, bounds[5:]))
 
     def missed(self, x: FloatArray, poses: FloatArray, bounds: FloatArray) -> float:
         """Return the largest amount by which a demand is missed in poses; 0 if none is."""
@@ -240,7 +299,7 @@ class Improvement:
             least = float(np.min(self.table(x[None], poses, bounds[None])))
         if not math.isfinite(least):
             return math.inf
-        return max(0.0, -least, float(bounds[4]) - self.terms.longest)
+        return max(0.0, -least)
 
 
 # Poses at which each demand is looked at in the beginning, and amount that is no miss.
@@ -249,7 +308,7 @@ FEASIBLE = 1e-6
 # Largest change of a variable in a round, and change of the cost that ends the rounds.
 TRUSTED, LEAST_TRUSTED, SETTLED = 0.3, 2e-3, 1e-3
 # Weight of what is missed beside the cost, and steps of the solver in a round.
-COST_OF_MISSES, COST_OF_LENGTH, STEPS = 30.0, 20.0, 12
+COST_OF_MISSES, STEPS = 30.0, 12
 # Rounds after which a machine that misses a demand by more than this is given up.
 PATIENCE, HOPELESS, LONG = 3, 0.02, 10
 
@@ -265,8 +324,11 @@ def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]
         (lows if x[index] > 0.0 else highs)[index] = math.copysign(LEAST, x[index])
     for index in (m.BOX_YAW, m.YAW, m.PITCH, m.ROLL):
         lows[index], highs[index] = x[index] - 1.0, x[index] + 1.0
+    for index in (m.TILT, m.SIZE):
+        lows[index], highs[index] = 0.02, 1.0
     free = search.free
     count = len(search.extra)
-    least = [0.02] * 4 + [0.1] + [-30.0] * count
+    # A demand that is kept is lowered no further.
+    least = [0.02] * 4 + [0.1] + [0.0 if each == MISS else -30.0 for each in search.extra]
     most = [FARTHEST] * 5 + [30.0] * count
     return np.array([*lows[free], *least]), np.array([*highs[free], *most])

@@ -1,89 +1,234 @@
 """The nearest values of demands at which a machine keeps a requirement, all other demands kept.
 
-One demand is relaxed at a time, far enough that a machine is found, and then brought back towards
-the required value as long as that machine can follow. What is told is a little farther than the
-last value that was kept, so that a new search finds it too, and it is checked.
+One demand at a time is left out, and missed as little as a machine can that keeps all others. What
+is told leaves some room, so that a new search finds a machine too: one from nothing, with another
+seed, has to find it in half of the usual time.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import repeat
 
 import msgspec
+import numpy as np
 
 from explorer.errors import ExplorerError
-from explorer.find.answers import Relaxation
+from explorer.find import machine_values as m
+from explorer.find.answers import FoundDesigns, Relaxation
+from explorer.find.bound import impossible_demands
+from explorer.find.candidates import candidates
+from explorer.find.certificate import Certificate, certify, lengths_over
+from explorer.find.demands import demands_of, limits_of
+from explorer.find.find import BLOCK_UNITS, CELLS, PATIENCE, UNITS_PER_SECOND, Search, find_designs
+from explorer.find.improvement import GROWING, RELAXED
 from explorer.find.requirement import MOST_TILT, Requirement
+from explorer.find.terms import Terms
+from explorer.mechanism.design import Design
+from explorer.numerics import checks
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.search.sqp import Stop
 
-# How far demands are relaxed at first, as factors one after another.
-FACTORS = (1.25, 1.6, 2.5, 4.0)
-# Halvings of the way back, and the share of it that is left as room for a new search.
-HALVINGS, ROOM = 5, 0.15
-# Factor on the longest leg found that leaves room for a new search.
-ROOM_OF_LEGS = 1.12
+# Factor on a demand at which a machine is certified, and factors with room for a new search.
+CLOSE, ROOMS = 1.005, (1.03, 1.1, 1.3)
+# Candidates of each block that are improved.
+STARTS = 3
+# Seconds of the search for the first machine, and of a new search for what is told.
+FIRST, SECONDS_AGAIN = 5.0, 5.0
+# Factors on the tilt and the box from which they grow.
+SMALL = {"tilt_deg": 0.3, "box_mm": 0.5}
 # Largest half-angle of a joint's cone, in degrees.
 MOST_SWING = 80.0
 
-Keeps = Callable[[Requirement, bool], float]
-"""The longest leg, in mm, of a machine that keeps a requirement, infinite if none is found.
-
-It begins with the last machine found, and lowers its legs as far as it can if it is told to."""
-
 
 def nearest_values(
-    requirement: Requirement, fields: Sequence[str], keeps: Keeps
+    requirement: Requirement,
+    *,
+    seconds: float = 20.0,
+    seed: int = 0,
+    stop: Callable[[], bool] | None = None,
 ) -> Iterator[Relaxation]:
-    """Yield the nearest values of some fields of a requirement."""
-    for field in fields:
-        own = requirement.legs.longest_mm
-        if field == "legs.longest_mm" and own:
-            free = msgspec.structs.replace(requirement.legs, longest_mm=None)
-            least = keeps(msgspec.structs.replace(requirement, legs=free), True)
-            kept = missed = max(1.0, ROOM_OF_LEGS * least / own)
-        else:
-            kept, missed = _nearest_factor(requirement, field, keeps)
-        if kept == math.inf:
-            continue
-        told = kept * (kept / missed) ** ROOM * (1.0 + 0.05 * min(1.0, kept - 1.0))
-        found = relaxed(requirement, field, told)
-        if found is not None and keeps(found, False) < math.inf:
-            yield _in_words(found, field, told)
+    """Yield the nearest values of the demands of a requirement, each as soon as it is found.
+
+    Args:
+        requirement: A requirement that no machine keeps, or for which none was found.
+        seconds: Time of the search on a usual core.
+        seed: Seed of the random machines.
+        stop: Called some hundred times a second; True ends the search.
+
+    Raises:
+        InputError: A number is out of range.
+    """
+    checks.whole("seed", seed, 0, 2**31 - 1)
+    left = UNITS_PER_SECOND * checks.positive("seconds", seconds)
+    fields, known = relaxable_fields(requirement), list[FloatArray]()
+    ends, terms = time.perf_counter() + PATIENCE * seconds, Terms.of(requirement)
+    for index, field in enumerate(fields):
+        # The first machine is sought longest, since others begin with it.
+        share = left / (len(fields) - index) if known else min(left, UNITS_PER_SECOND * FIRST)
+        search = _Nearest(terms, (), share, ends, stop or (lambda: False), seed, field=field)
+        told = search.nearest(known)
+        left -= search.done
+        if told is not None:
+            yield told
+        if search.is_cancelled:
+            return
 
 
-def _nearest_factor(requirement: Requirement, field: str, keeps: Keeps) -> tuple[float, float]:
-    """Return the least factor on a demand that a machine keeps, and the largest that none does."""
-    missed = 1.0
-    for kept in FACTORS:
-        if _keeps(requirement, field, kept, keeps):
-            break
-        missed = kept
-    else:
-        return math.inf, math.inf
-    keeps(relaxed(requirement, field, kept) or requirement, True)
-    for _ in range(HALVINGS):
-        middle = math.sqrt(missed * kept)
-        if _keeps(requirement, field, middle, keeps):
-            kept = middle
-        else:
-            missed = middle
-    return kept, missed
+def find_or_relax(
+    requirement: Requirement,
+    *,
+    watch: Callable[[FoundDesigns], None],
+    stop: Callable[[], bool],
+    count: int = 4,
+    seconds: float = 10.0,
+    seed: int = 0,
+    design: Design | None = None,
+) -> FoundDesigns:
+    """Search for designs as `find_designs` does, and for the nearest values if there are none.
+
+    The refusal is watched at once, and then every nearest value as soon as it is found.
+    """
+    found = find_designs(
+        requirement, count=count, seconds=seconds, seed=seed, design=design, watch=watch, stop=stop
+    )
+    if found.status in ("impossible", "none"):
+        watch(found)
+        for each in nearest_values(requirement, seconds=2.0 * seconds, seed=seed, stop=stop):
+            found = replace(found, nearest=(*found.nearest, each))
+            watch(found)
+    return found
 
 
-def _keeps(requirement: Requirement, field: str, factor: float, keeps: Keeps) -> bool:
-    found = relaxed(requirement, field, factor)
-    return found is not None and keeps(found, False) < math.inf
+@dataclass
+class _Nearest(Search):
+    """The search for the nearest value of one field.
+
+    Attributes:
+        field: The field.
+        factor: Factor on it that the last machine asked for.
+    """
+
+    field: str = ""
+    factor: float = 1.0
+
+    def nearest(self, known: list[FloatArray]) -> Relaxation | None:
+        """Return the nearest value, and add its machine to the known ones; None if there is none.
+
+        The known machines keep all demands but one, and are tried first.
+        """
+        try:
+            found = next(filter(None, map(self.improve, self._openings(known), repeat(self.field))))
+        except Stop:
+            return None
+        known.append(found.x)
+        return self._told(self.factor)
+
+    def _told(self, factor: float) -> Relaxation | None:
+        """Return a value with as little room as a new search needs; None if it finds nothing."""
+        for room in ROOMS:
+            asked = relaxed(self.terms.requirement, self.field, factor * room)
+            if asked is None:
+                return None
+            if impossible_demands(asked):
+                continue
+            units, kinds, seed = UNITS_PER_SECOND * SECONDS_AGAIN, (asked.prefer,), self.seed + 1
+            new = Search(Terms.of(asked), kinds, units, self.ends, self.stop, seed, math.inf)
+            new.run(None, lambda: None)
+            new.finish()
+            self.done += new.done
+            self.is_cancelled |= new.is_cancelled
+            if new.best:
+                return _in_words(asked, self.terms.requirement, self.field)
+        return None
+
+    def _openings(self, known: list[FloatArray]) -> Iterator[FloatArray]:
+        """Yield machines that may miss the demand by far, without an end."""
+        size = SMALL.get(self.field, 1.0)
+
+        def opened(x: FloatArray) -> FloatArray:
+            x = x.copy()
+            x[m.TILT], x[m.SIZE] = 1.0, 1.0
+            if self.field in GROWING:
+                x[GROWING[self.field]] = size
+            return x
+
+        yield from map(opened, known[::-1])
+        easy = _left_out(self.terms.requirement, self.field, size)
+        for x, missed, large in candidates(Terms.of(easy), self.seed):
+            self.spend(BLOCK_UNITS)
+            order = np.argsort(np.log(large) + 4.0 * np.maximum(missed, 0.0))[:STARTS]
+            for row in x[order]:
+                yield opened(_scaled(row, size) if self.field == "box_mm" else row)
+
+    def certify(self, x: FloatArray, poses: FloatArray) -> Certificate:
+        """Return the certificate of a machine for the value that it asks for, and a little more."""
+        self.factor = self._factor(x, poses)
+        asked = relaxed(self.terms.requirement, self.field, max(1.0, self.factor) * CLOSE)
+        scales = np.array([1.0, 1.0, 1.0, 1.0, x[m.TILT]])
+        moved = _scaled(x, 1.0 / x[m.SIZE])
+        moved[m.TILT] = moved[m.SIZE] = 1.0
+        own = self.terms if asked is None else Terms.of(asked)
+        found = certify(moved, own, cells=CELLS, poses=poses * scales, is_quick=True)
+        return replace(found, poses=found.poses / scales)
+
+    def _factor(self, x: FloatArray, poses: FloatArray) -> float:
+        """Return the factor on the demand that a machine asks for in poses."""
+        terms, field = self.terms, self.field
+        if field in GROWING:
+            return float(1.0 / x[GROWING[field]])
+        own = _value(terms.requirement, field)
+        if field in ("legs.ratio", "legs.longest_mm"):
+            shortest, longest = lengths_over(x, terms, poses).T
+            used = longest / shortest if field == "legs.ratio" else terms.scale_mm * longest
+            return float(used.max() / own)
+        every = [*limits_of(terms), *demands_of(terms)]
+        demand = next(each for each in every if each.name == RELAXED[field])
+        at = terms.values(x, poses)
+        if demand.tell:
+            return float(np.max(demand.tell(at)) / own)
+        value = float(demand.told(demand.missed_rows(at).max()))
+        return (own / value if value > 0.0 else math.inf) if demand.is_least else value / own
+
+
+def _scaled(x: FloatArray, factor: float) -> FloatArray:
+    """Return a machine with its lengths times a factor."""
+    x = x.copy()
+    x[: m.BOX_YAW] *= factor
+    x[m.TX : m.TILT] *= factor
+    return x
+
+
+def _left_out(requirement: Requirement, field: str, size: float) -> Requirement:
+    """Return a requirement without one demand, or with a tilt or a box of some size."""
+    if field in SMALL:
+        return relaxed(requirement, field, 1.0 / size) or requirement
+    head, _, tail = field.partition(".")
+    if tail:
+        changed = {tail: 0.0 if tail == "apart_mm" else None}
+        changed |= {"pull_n": None} if tail == "push_n" else {}
+        return msgspec.structs.replace(
+            requirement, legs=msgspec.structs.replace(requirement.legs, **changed)
+        )
+    return msgspec.structs.replace(requirement, **{head: None})
+
+
+def _value(requirement: Requirement, field: str) -> float:
+    head, _, tail = field.partition(".")
+    return float(getattr(requirement.legs, tail) if tail else getattr(requirement, head))
 
 
 def relaxable_fields(requirement: Requirement) -> list[str]:
     """Return the demands that may be relaxed, those first that a user gives up most readily."""
-    legs = requirement.legs
-    fields = ["legs.longest_mm"] * (legs.longest_mm is not None)
-    fields += ["tilt_deg"] * (requirement.tilt_deg > 0.0) + ["box_mm"]
-    fields += ["legs.ratio"] * (legs.ratio is not None)
-    fields += ["swing_deg"] * (requirement.swing_deg is not None)
-    fields += ["legs.push_n"] * (legs.push_n is not None)
-    return fields + ["legs.apart_mm"] * (legs.apart_mm > 0.0)
+
+    def is_demanded(field: str) -> bool:
+        head, _, tail = field.partition(".")
+        return bool(getattr(requirement.legs, tail) if tail else getattr(requirement, head))
+
+    return [field for field in _WORDS if is_demanded(field)]
 
 
 def relaxed(requirement: Requirement, field: str, factor: float) -> Requirement | None:
@@ -97,7 +242,7 @@ def relaxed(requirement: Requirement, field: str, factor: float) -> Requirement 
         if field == "box_mm":
             value = tuple(_three_digits(edge / factor, up=False) for edge in own)
             return msgspec.structs.replace(requirement, box_mm=value)
-        shrinks = field in ("tilt_deg", "legs.apart_mm")
+        shrinks = field in ("tilt_deg", "legs.apart_mm", "transmission")
         value = _three_digits(own / factor if shrinks else own * factor, up=not shrinks)
         if (field == "swing_deg" and value > MOST_SWING) or (
             field == "tilt_deg" and value > MOST_TILT
@@ -120,21 +265,25 @@ def _three_digits(value: float, *, up: bool) -> float:
 
 
 _WORDS = {
-    "tilt_deg": ("tilt", "°"),
     "legs.longest_mm": ("longest leg", "mm"),
+    "tilt_deg": ("tilt", "°"),
+    "box_mm": ("box", "mm"),
     "legs.ratio": ("ratio of the legs", ""),
     "swing_deg": ("swing", "°"),
     "legs.push_n": ("push of the actuators", "N"),
     "legs.apart_mm": ("distance of the legs", "mm"),
+    "legs.speed_mm_s": ("speed of the actuators", "mm/s"),
+    "transmission": ("transmission index", ""),
+    "error_mm": ("error", "mm"),
+    "deflection_mm": ("deflection", "mm"),
 }
 
 
-def _in_words(found: Requirement, field: str, factor: float) -> Relaxation:
+def _in_words(found: Requirement, own: Requirement, field: str) -> Relaxation:
     if field == "box_mm":
         edges = " × ".join(f"{edge:g}" for edge in found.box_mm)
-        return Relaxation(field, 1.0 / factor, "", f"box {edges} mm", found)
-    name, unit = _WORDS[field]
-    head, _, tail = field.partition(".")
-    value = float(getattr(found.legs, tail) if tail else getattr(found, head))
+        factor = found.box_mm[0] / own.box_mm[0]
+        return Relaxation(field, factor, "", f"box {edges} mm", found)
+    (name, unit), value = _WORDS[field], _value(found, field)
     space = "" if unit in ("", "°") else " "
     return Relaxation(field, value, unit, f"{name} {value:g}{space}{unit}", found)

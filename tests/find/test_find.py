@@ -15,6 +15,7 @@ from explorer.find.answers import FoundDesigns
 from explorer.find.check import check_requirement
 from explorer.find.demands import demands_of
 from explorer.find.find import find_designs
+from explorer.find.nearest import nearest_values
 from explorer.find.requirement import (
     RequiredLegs,
     Requirement,
@@ -108,16 +109,16 @@ def test_find_designs_cancelled_keep_what_was_found() -> None:
 def test_need_below_its_bound_is_refused_with_a_nearest_value_that_is_found() -> None:
     short = msgspec.structs.replace(NEED.legs, longest_mm=200.0)
     requirement = msgspec.structs.replace(NEED, legs=short)
-    seen: list[FoundDesigns] = []
-    found = find_designs(requirement, seconds=2.0, watch=seen.append)
+    # A refusal takes no search.
+    found = find_designs(requirement, stop=lambda: pytest.fail("searched"))
     assert found.status == "impossible"
     assert not found.designs
-    assert seen[0].impossible == found.impossible
-    told = {each.demand: each.value for each in found.nearest}
-    assert told["legs.longest_mm"] > 342.0
-    legs = msgspec.structs.replace(short, longest_mm=told["legs.longest_mm"])
-    again = msgspec.structs.replace(requirement, legs=legs)
-    assert find_designs(again, count=1, seconds=6.0).designs
+    first = next(nearest_values(requirement))
+    assert first.demand == "legs.longest_mm"
+    assert found.bound_mm < first.value < 500.0
+    seen: list[FoundDesigns] = []
+    again = find_designs(first.requirement, seed=7, watch=seen.append, stop=lambda: bool(seen))
+    assert again.designs
 
 
 def test_check_of_the_papers_optimum_tells_what_it_misses_and_where() -> None:

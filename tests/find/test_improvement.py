@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from needs import NEEDS, requirement_of
 
+from explorer.find import machine_values as m
 from explorer.find.candidates import candidates, standard_poses
-from explorer.find.improvement import Improvement
-from explorer.find.requirement import PREFERENCES, Preference
+from explorer.find.improvement import GROWING, Improvement
+from explorer.find.requirement import PREFERENCES, Preference, RequiredLegs
 from explorer.find.terms import Terms
 
 TERMS = Terms.of(requirement_of(NEEDS[0]))
@@ -24,6 +27,33 @@ def test_improvement_lowers_what_a_preference_asks_for(preference: Preference) -
     before, improved = search.cost(POSES), search.run(POSES, rounds=6)
     assert improved.missed <= 1e-3
     assert improved.cost < before - 0.05
+
+
+@pytest.mark.parametrize(
+    ("field", "changes"),
+    [
+        ("tilt_deg", {"tilt_deg": 50.0}),
+        ("box_mm", {"legs": RequiredLegs(ratio=1.8, longest_mm=250.0)}),
+        ("swing_deg", {"swing_deg": 12.0}),
+        ("transmission", {"transmission": 0.99}),
+    ],
+)
+def test_improvement_for_a_field_keeps_all_other_demands(
+    field: str, changes: dict[str, Any]
+) -> None:
+    terms = Terms.of(requirement_of(NEEDS[0], **changes))
+    poses, start = standard_poses(terms.tilt), START.copy()
+    start[[m.TILT, m.SIZE]] = [0.3 if field == each else 1.0 for each in ("tilt_deg", "box_mm")]
+    search = Improvement(terms, field, start)
+    before, improved = search.cost(poses), search.run(poses)
+    assert improved.missed <= 1e-3
+    assert improved.cost < before
+    # Its own demand is missed, which no machine keeps with the others.
+    own = Improvement(terms, "small", improved.x)
+    if field in GROWING:
+        assert start[GROWING[field]] < improved.x[GROWING[field]] < 1.0
+    else:
+        assert own.missed(improved.x, poses, np.array([0.0] * 4 + [8.0])) > 1e-3
 
 
 def test_improvement_leaves_an_amount_to_spare() -> None:

@@ -19,7 +19,7 @@ from explorer.files.writing import check_writable, make_folder
 from explorer.find.answers import DemandCheck, FoundDesign, FoundDesigns, RequirementCheck
 from explorer.find.bound import rounded_down
 from explorer.find.check import check_requirement
-from explorer.find.find import find_designs
+from explorer.find.nearest import find_or_relax
 from explorer.find.requirement import PREFERENCES, Requirement, load_requirement
 from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
@@ -60,7 +60,7 @@ class FindCommand(options.JsonOptions):
     """Find designs that keep a requirement, each of another kind, the preferred one first.
 
     Ctrl-C, or SIGTERM, ends the search and keeps what was found. If nothing was found, the exit
-    status is 1, and the output has the nearest values that can be reached.
+    status is 1, and the nearest values that can be reached are told as they are found.
     """
 
     requirement: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="REQUIREMENT")]
@@ -113,9 +113,16 @@ class FindCommand(options.JsonOptions):
             meter.show(progress_line(last[-1], is_over=share > 1.0), min(share, 1.0))
             return interruption.is_asked()
 
+        def watch(found: FoundDesigns) -> None:
+            last.append(found)
+            if found.nearest:
+                meter.tell(f"within reach: {found.nearest[-1].words}")
+            elif not found.designs:
+                meter.tell(_reason(found))
+
         with Meter() as meter:
             given = output.attributes(self, "count seconds seed")
-            return find_designs(requirement, design=start, watch=last.append, stop=stop, **given)
+            return find_or_relax(requirement, design=start, watch=watch, stop=stop, **given)
 
 
 def progress_line(found: FoundDesigns, *, is_over: bool) -> str:

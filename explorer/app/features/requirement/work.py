@@ -7,7 +7,7 @@ from explorer.app.session.feed import FeedOf
 from explorer.app.state.frame import Frame
 from explorer.find.answers import FoundDesigns, RequirementCheck
 from explorer.find.check import check_requirement
-from explorer.find.find import find_designs
+from explorer.find.nearest import find_or_relax
 from explorer.find.requirement import Requirement
 from explorer.jobs.process import Channel
 from explorer.mechanism.design import Design
@@ -28,4 +28,4 @@ CHECK_FEED = FeedOf(check_design, _request_for, process="check", in_scene=False)
 
 def find_machines(requirement: Requirement, channel: Channel) -> FoundDesigns:
     """Search for machines that keep a requirement, and send what is found so far to the parent."""
-    return find_designs(requirement, watch=channel.send, stop=channel.is_cancelled)
+    return find_or_relax(requirement, watch=channel.send, stop=channel.is_cancelled)
