@@ -1,7 +1,7 @@
 """Machines that a search starts from: of many random ones, those that nearly keep a requirement.
 
-Each is looked at in the
-corners of the box, first without a tilt, and the few that are left at the largest tilts.
+Each is looked at in the corners of the box, first without a tilt, and the few that are left at the
+largest tilts.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.find import machine_values as m
+from explorer.find.demands import clearances_of, limits_of
 from explorer.find.machine_values import HOME, MachineValues
 from explorer.find.over_tilts import CORNERS, poses_over
 from explorer.find.terms import Terms, part_slacks
@@ -27,6 +28,8 @@ BLOCK = 8192
 AZIMUTHS = 8
 # Candidates that miss a demand by more than this are dropped after each look.
 NEARLY = 0.6
+# What counts as a whole miss: in the cosine of a swing, and of a margin over the longest leg.
+CONE, MARGIN = 0.6, 0.1
 
 
 def standard_poses(tilt: float) -> FloatArray:
@@ -45,16 +48,11 @@ def misses(terms: Terms, at: MachineValues) -> tuple[FloatArray, FloatArray]:
     longest, shortest = lengths.max(axis=1), lengths.min(axis=1)
     large = longest.max(axis=1)
     found = [(longest / shortest).max(axis=1) / terms.ratio - 1.0, large / terms.longest - 1.0]
-    signed = [side * each for side, each in zip(at.sides[:3], at.margins, strict=True)]
-    least = np.min([each.min(axis=1) for each in signed], axis=0)
-    found.append((terms.margin - least) / (0.1 * large))
-    if terms.swing < math.pi:
-        cosine = np.min([each.min(axis=1) for each in at.swings], axis=0)
-        swing = np.arccos(np.clip(cosine, -1.0, 1.0))
-        found.append(swing / terms.swing - 1.0)
     if terms.distance > 0.0:
-        near = np.min([each.min(axis=1) for each in at.uncrossed_distances], axis=0)
-        found.append(1.0 - near / terms.distance)
+        at.distances = at.uncrossed_distances
+    for demand in (*limits_of(terms), *clearances_of(terms)):
+        share = {"swing": CONE, "clearance": terms.distance}.get(demand.name, MARGIN * large)
+        found.append(np.max([each.max(axis=1) for each in demand.missed(at)], axis=0) / share)
     if terms.parts is not None:
         tight = [np.asarray(each).min(axis=-1) for each in part_slacks(terms.parts, at.home)]
         found.append(-np.min(np.broadcast_arrays(*tight), axis=0) / (0.2 * large))

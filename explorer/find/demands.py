@@ -110,10 +110,12 @@ def limits_of(terms: Terms) -> list[Demand]:
 
 def demands_of(terms: Terms) -> list[Demand]:
     """Return the demands that are proven over cells of poses."""
-    return [*_clearances(terms), *_of_actuators(terms)]
+    return [*clearances_of(terms), *_of_actuators(terms)]
 
 
-def _clearances(terms: Terms) -> Iterator[Demand]:
+def clearances_of(terms: Terms) -> Iterator[Demand]:
+    """Yield the demand on the distances of the legs, if there is one."""
+
     def distances(at: MachineValues) -> list[Any]:
         return at.distances
 
