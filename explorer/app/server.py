@@ -16,9 +16,11 @@ from pathlib import Path
 
 import viser
 
+from explorer.app.features.requirement.state import Required
 from explorer.app.features.studies.folders import STUDIES_FOLDER, StudyFolders
 from explorer.app.page import TITLE, Page
 from explorer.app.session.history import check_drawable
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import open_state
 from explorer.app.state.view import View
 from explorer.app.storage.user_data import UserData, open_user_data
@@ -34,7 +36,7 @@ from explorer.page.security import EVERYWHERE, Access, Guard, is_loopback
 from explorer.page.storage.folder import data_folder
 
 # Preset that is opened if there is no session to continue.
-FIRST_DESIGN = "paper-optimal"
+FIRST_DESIGN = "buildable"
 LOG = "explorer.log"
 """Name of the log of unexpected errors in the user's data folder."""
 # Size in bytes at which a new log is begun, and number of older ones that are kept.
@@ -79,6 +81,7 @@ def start(
     user_data: UserData | None = None,
     tour: bool = False,
     studies: StudyFolders | None = None,
+    required: Required | None = None,
 ) -> Running:
     """Start an explorer in this process and return at once.
 
@@ -96,13 +99,16 @@ def start(
             None to save nothing.
         tour: Whether the tour begins by itself in a browser that has not seen it.
         studies: Where design studies lie; None to offer none.
+        required: The requirement of the form, and whether the design is checked against it;
+            the usual one, not checked, if None.
 
     Raises:
         InputError: The design or the pose is too large to be drawn.
         ServerError: The address or the port cannot be had, or the token or a name cannot be used.
     """
     history = None if user_data is None else user_data.history
-    state = open_state(design, pose, view) if history is None else history.step.state
+    opening = with_value(open_state(design, pose, view), Required.in_state, required or Required())
+    state = opening if history is None else history.step.state
     check_drawable(state)
     access = Access(host, token, allow_hosts)
     guard = Guard(access)
@@ -147,6 +153,8 @@ def serve(
     for message in user_data.messages:
         sys.stderr.write(f"{message}\n")
     opening = PRESETS[FIRST_DESIGN] if design is None else design
+    # The requirement of the form is the one that gave the first design.
+    required = Required(is_checked=design is None)
     try:
         running = start(
             opening,
@@ -157,6 +165,7 @@ def serve(
             user_data=user_data,
             tour=True,
             studies=StudyFolders(data_folder() / STUDIES_FOLDER, studies),
+            required=required,
         )
     except ExplorerError:
         user_data.store.close()

@@ -40,8 +40,8 @@ class DesignOptions:
     """The option for the design."""
 
     design: Annotated[str, tyro.conf.arg(metavar=values.DESIGN_NAME)] = "paper-optimal"
-    """A preset (paper-initial, paper-optimal), a design file (JSON), or the name of a design
-    saved on the page."""
+    """A preset (buildable, paper-initial, paper-optimal), a design file (JSON), or the name of
+    a design saved on the page."""
 
     def read_design(self) -> Design:
         """Return the design, as `load` does."""

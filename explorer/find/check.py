@@ -115,7 +115,7 @@ class _Check:
         is_least: bool = False,
     ) -> DemandCheck:
         """Return the check of the worst of the lengths or their ratios, which is that in a row."""
-        worst = float(values[row])
+        worst, limit = float(values[row]), float(limit)
         spare = worst - limit if is_least else limit - worst
         item = self.found.items[row] if name == LENGTH else LENGTHS[row]
         kept, pose = spare >= -KEPT * limit, self._pose(self.found.poses[row])

@@ -78,5 +78,5 @@ def test_session_of_a_killed_explorer_is_resumed_by_the_next_one_alone(tmp_path:
         first.process.kill()
         first.process.wait()
     with serve(tmp_path) as second:
-        assert "Going on with 'paper-optimal'" in second.said
+        assert "Going on with 'buildable'" in second.said
         assert second.value("x") == 122.5

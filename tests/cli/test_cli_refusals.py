@@ -35,7 +35,7 @@ inverse --folds 1 -2 3 4 5 6 | beta must lie within 0° to 180°; got -2.0°
 inverse --folds 1 2 181 4 5 6 | epsilon must lie within 0° to 180°
 inverse --folds 1 2 3 4 5 -190 | --folds: phi3 must lie within -180° to 180°
 singularity --position 1e200 1 1 | must not exceed 1e+12 in size
-singularity --design no-such | paper-initial, paper-optimal
+singularity --design no-such | buildable, paper-initial, paper-optimal
 serve --port 65536 | explorer serve: --port must
 serve --port http | explorer serve: --port must
 --port x | explorer serve: --port
