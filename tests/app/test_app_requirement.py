@@ -27,6 +27,7 @@ from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import EDGES, box_corners
 from explorer.app.features.requirement.state import EXAMPLE, Required
 from explorer.app.features.requirement.work import CHECK_FEED
+from explorer.app.server import FIRST_DESIGN
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
@@ -42,12 +43,16 @@ from explorer.find.answers import (
     Relaxation,
     RequirementCheck,
 )
+from explorer.find.check import check_requirement
 from explorer.find.requirement import Requirement, decode_requirement, encode_requirement
 from explorer.jobs.jobs import LongJob, do_nothing
 from explorer.jobs.process import CANCELLED, Call
+from explorer.measures.catalogue import measure_design
+from explorer.measures.measure import Case
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.prototype.fitting import buildability
 
 OPTIMAL = PRESETS["paper-optimal"]
 FOUND = msgspec.structs.replace(
@@ -340,3 +345,21 @@ def test_box_is_that_of_the_requirement_about_home_else_of_the_design_turned_by_
         assert np.sort(np.linalg.norm(sides, axis=1)) == pytest.approx(np.repeat(np.sort(edges), 4))
         along = sides[np.isclose(np.linalg.norm(sides, axis=1), 20.0)]
         assert np.degrees(np.arctan2(along[:, 1], along[:, 0])) == pytest.approx(30.0)
+
+
+def test_first_design_can_be_built_and_keeps_the_requirement_of_the_form() -> None:
+    design = PRESETS[FIRST_DESIGN]
+    check = check_requirement(design, EXAMPLE)
+    assert check.kept, [demand.words for demand in check.missed]
+    numbers = [n for each in check.demands for n in (each.worst, each.limit, each.spare)]
+    assert {*map(type, numbers)} == {float}
+    assert {type(each.kept) for each in check.demands} == {bool}
+    rows = words.checklist(check, "", "")
+    assert "Requirement kept" in rows and "is-beyond" not in rows
+    built = buildability(design)
+    assert not built.problems and not built.short_legs
+    names = ("volume", "accessible_volume", "mean_transmission_index")
+    own, paper = (measure_design(Case(each), names) for each in (design, OPTIMAL))
+    assert own["mean_transmission_index"] >= 0.5 > paper["mean_transmission_index"]
+    # Also the part that home reaches without a collision of the legs is larger for the reach.
+    assert own["accessible_volume"] / design.reach**3 >= paper["volume"] / OPTIMAL.reach**3
