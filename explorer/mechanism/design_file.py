@@ -2,8 +2,9 @@
 
 Unknown fields are refused, so that a misspelt limit is never silently ignored, and so are
 repeated fields. Schema 1 has a part of the fields of schema 2, and both are read. The presets are
-both rows of the paper's Table 1, and a machine that can be built, found for a requirement. Typical precision and stiffness are those of a small machine with
-ball screws and milled parts; the page and the commands say where they are assumed.
+both rows of the paper's Table 1, and a machine that can be built, found for a requirement. Typical
+precision and stiffness are those of a small machine with ball screws and milled parts; the page and
+the commands say where they are assumed.
 """
 
 from __future__ import annotations

@@ -355,11 +355,16 @@ def test_first_design_can_be_built_and_keeps_the_requirement_of_the_form() -> No
     assert {*map(type, numbers)} == {float}
     assert {type(each.kept) for each in check.demands} == {bool}
     rows = words.checklist(check, "", "")
-    assert "Requirement kept" in rows and "is-beyond" not in rows
+    assert "Requirement kept" in rows
+    assert "is-beyond" not in rows
     built = buildability(design)
-    assert not built.problems and not built.short_legs
+    assert not built.problems
+    assert not built.short_legs
     names = ("volume", "accessible_volume", "mean_transmission_index")
-    own, paper = (measure_design(Case(each), names) for each in (design, OPTIMAL))
-    assert own["mean_transmission_index"] >= 0.5 > paper["mean_transmission_index"]
+    both = [measure_design(Case(each), names) for each in (design, OPTIMAL)]
+    (_, clear, own), (most, _, paper) = (
+        [float(row[name] or 0.0) for name in names] for row in both
+    )
+    assert own >= 0.5 > paper
     # Also the part that home reaches without a collision of the legs is larger for the reach.
-    assert own["accessible_volume"] / design.reach**3 >= paper["volume"] / OPTIMAL.reach**3
+    assert clear / design.reach**3 >= most / OPTIMAL.reach**3

@@ -74,7 +74,7 @@ def test_session_of_a_killed_explorer_is_resumed_by_the_next_one_alone(tmp_path:
     with serve(tmp_path) as first:
         assert "Going on" not in first.said
         first.drag("x", 110.0, 115.0, 122.5)
-        wait_for(lambda: is_saved(tmp_path, 12.25))
+        wait_for(lambda: is_saved(tmp_path, 122.5))
         first.process.kill()
         first.process.wait()
     with serve(tmp_path) as second:

@@ -6,7 +6,7 @@ import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.requirement.state import Required
-from explorer.app.scene.placing import Placed, ScenePart
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.find.requirement import Requirement
 from explorer.measures.box import corners_of
@@ -28,11 +28,16 @@ class RequiredBox(ScenePart):
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the box of a frame."""
+        corners = self.corners(placed)
+        yield self._edges, "visible", len(corners) > 0
+        if len(corners):
+            yield self._edges, "points", corners[EDGES].astype(np.float32)
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of the box, shape (8, 3) or (0, 3)."""
         state = placed.frame.state
         corners = box_corners(state.design, Required.of(state).requirement)
-        yield self._edges, "visible", corners is not None
-        if corners is not None:
-            yield self._edges, "points", (placed.scale * corners[EDGES]).astype(np.float32)
+        return NO_POINTS if corners is None else placed.scale * corners
 
 
 def box_corners(design: Design, requirement: Requirement | None = None) -> FloatArray | None:
