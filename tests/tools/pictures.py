@@ -29,13 +29,14 @@ from explorer.app.features.compare.feature import Pin
 from explorer.app.features.compare.state import CompareView
 from explorer.app.features.optimise.actions import StartRun
 from explorer.app.features.optimise.state import OptimisationRequest
+from explorer.app.features.requirement.state import EXAMPLE, OpenFound
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.studies.state import Brush, within
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import draw_page, open_page, settle, stable_picture
-from explorer.app.server import Running, start
+from explorer.app.server import FIRST_DESIGN, Running, start
 from explorer.app.state.actions import Action, Open, Set
 from explorer.app.state.geometry import SetVariable
 from explorer.app.state.moves import SetJoint, SetPose, SetPosition
@@ -113,7 +114,7 @@ def bare(**changes: Any) -> Action:
 
 SCENES = {
     "home": Scene(),
-    "page": Scene(panels=True),
+    "page": Scene(panels=True, actions=(OpenFound(PRESETS[FIRST_DESIGN], EXAMPLE),)),
     # δ2 is small, the other two are not: both lines are orange and all else is blue.
     "near-singular": Scene(
         pose=Pose.of_yaw_pitch_roll((9, 8, 7.5), (-38, 24, 8)),
