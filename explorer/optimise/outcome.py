@@ -66,8 +66,10 @@ class Iterate(IterateRecord, frozen=True, kw_only=True):
     design: Design
 
 
-class RunSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The result of the search from one start.
+class Run(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True
+):
+    """The search from one start.
 
     Attributes:
         start: Values of the variables at the start.
@@ -76,6 +78,9 @@ class RunSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         evaluations: Number of designs that were measured.
         attempts: Number of attempts, from the start and from elsewhere.
         holding: Demand or bound that holds the best iterate, "" if none does.
+        message: Result in one line, in design units.
+        best: Index of the best iterate in the history.
+        reason: Why it found no optimum, in one line, "" where its status says all.
     """
 
     start: tuple[float, ...]
@@ -84,16 +89,9 @@ class RunSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     evaluations: int
     attempts: int
     holding: str
-
-
-class Run(RunSummary, frozen=True, kw_only=True):
-    """The search from one start, with its best iterate.
-
-    The reason says in one line why it found no optimum, "" where its status says all.
-    """
-
-    reason: str
-    best: Iterate
+    message: str = ""
+    best: int
+    reason: str = ""
 
     def words(self, reached: str) -> str:
         """Return the result in one line, given the objective that was reached, with its name."""
@@ -108,13 +106,6 @@ class Run(RunSummary, frozen=True, kw_only=True):
             "cancelled": f"cancelled: {end}",
         }
         return self.reason or told[self.status]
-
-
-class RunRecord(RunSummary, frozen=True, kw_only=True):
-    """A run in a file, with its result in one line and its best iterate's index in the history."""
-
-    message: str
-    best: int
 
 
 @dataclass(frozen=True)
@@ -166,12 +157,12 @@ class Outcome:
     @property
     def best(self) -> Iterate:
         """The best iterate."""
-        return self.run.best
+        return self.history[self.run.best]
 
     @property
     def design(self) -> Design:
         """The best design."""
-        return self.run.best.design
+        return self.best.design
 
     @property
     def iterations(self) -> int:
@@ -203,7 +194,7 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     settings: Settings
     design: Design
     chosen: int
-    runs: tuple[RunRecord, ...]
+    runs: tuple[Run, ...]
     history: tuple[IterateRecord, ...]
     seconds: float
     versions: dict[str, str]
@@ -219,20 +210,12 @@ def reached_text(problem: Problem, best: Iterate) -> str:
 
 def record_of(outcome: Outcome, settings: Settings) -> Record:
     """Return the record of an optimisation that was run with these settings."""
-    problem, shared = outcome.problem, RunSummary.__struct_fields__
     return Record(
-        problem=problem,
+        problem=outcome.problem,
         settings=settings,
         design=outcome.design,
         chosen=outcome.chosen,
-        runs=tuple(
-            RunRecord(
-                **{name: getattr(run, name) for name in shared},
-                message=run.words(reached_text(problem, run.best)),
-                best=run.best.number,
-            )
-            for run in outcome.runs
-        ),
+        runs=outcome.runs,
         history=msgspec.convert(outcome.history, tuple[IterateRecord, ...], from_attributes=True),
         seconds=outcome.seconds,
         versions=versions(),

@@ -56,7 +56,7 @@ def optimise_design(
         for values in (problem.start_values, *more_starts(problem, starts - 1, seed)):
             trail.run = len(runs)
             best = runs[_best(runs, trail)] if runs else None
-            to_beat = best.best if best and best.status == "converged" else None
+            to_beat = trail.history[best.best] if best and best.status == "converged" else None
             runs.append(Search(problem, values, iterations, trail, to_beat).run())
             done = problem.objective == "match-volume" and runs[-1].status == "converged"
             if done or trail.is_cancelled:
@@ -79,7 +79,7 @@ def _best(runs: Sequence[Run], trail: Trail) -> int:
 
     def rank(index: int) -> tuple[object, ...]:
         run = runs[index]
-        is_empty, missed, value = trail.rank(run.best)
+        is_empty, missed, value = trail.rank(trail.history[run.best])
         return run.status != "converged", is_empty, missed, float(f"{value:.6g}")
 
     return min(range(len(runs)), key=rank)

@@ -45,7 +45,7 @@ from explorer.mechanism.design import VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.tilt_torsion import TiltTorsion
-from explorer.optimise.outcome import Iterate, IterateRecord, Record, RunRecord, Settings
+from explorer.optimise.outcome import Iterate, IterateRecord, Record, Run, Settings
 from explorer.optimise.problem import YAW
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -145,7 +145,7 @@ def _record(run: SearchRun, iterates: tuple[Iterate, ...], best: Iterate) -> Rec
         design=best.design,
         chosen=0,
         runs=(
-            RunRecord(
+            Run(
                 start=run.problem.start_values,
                 status="stalled",
                 best=best.number,

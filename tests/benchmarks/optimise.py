@@ -143,7 +143,9 @@ def _random_starts(name: str, clearance: float | None) -> Row:
 def _smallest_reach(name: str, clearance: float | None) -> Row:
     outcomes = [optimise_design(reach_problem(clearance), starts=STARTS) for _ in range(ROUNDS)]
     outcome, median = outcomes[0], float(np.median([each.seconds for each in outcomes]))
-    ends = Counter(f"{run.best.objective:.2f} ({run.status})" for run in outcome.runs)
+    ends = Counter(
+        f"{outcome.history[run.best].objective:.2f} ({run.status})" for run in outcome.runs
+    )
     spread = ", ".join(f"{many} at {end}" for end, many in sorted(ends.items()))
     return Row(
         f"smallest reach for the volume of the paper's optimum, interference {name}",

@@ -165,7 +165,10 @@ def test_several_starts_reach_an_optimum_that_one_misses() -> None:
     assert several.converged
     assert several.design.reach <= 17.90
     assert len(several.runs) == 4
-    assert several.best.objective <= min(run.best.objective for run in several.runs) + 1e-6
+    assert (
+        several.best.objective
+        <= min(several.history[run.best].objective for run in several.runs) + 1e-6
+    )
     assert {each.run for each in several.history} == set(range(4))
 
 
@@ -173,16 +176,16 @@ def test_start_outdone_even_without_the_clearance_ends_there() -> None:
     problem = reach_problem(0.2)
     outcome = optimise_design(problem, starts=2)
     assert_is_sound(outcome)
-    first, second = outcome.runs
-    assert outcome.run is first
-    assert (first.status, second.status) == ("converged", "outdone")
+    assert outcome.chosen == 0
+    assert [run.status for run in outcome.runs] == ["converged", "outdone"]
+    first, second = (outcome.history[run.best] for run in outcome.runs)
     margin = problem.demands.clearance_margin
-    assert least_clearance_by_sampling(first.best.design, margin, 40_000) >= 0.2
-    assert second.best.objective > first.best.objective
+    assert least_clearance_by_sampling(first.design, margin, 40_000) >= 0.2
+    assert second.objective > first.objective
     # Its iterates say that the legs are too near.
-    assert least_clearance_by_sampling(second.best.design, margin, 40_000) < 0.2
-    assert second.best.spare < 0.0
-    assert "clearance of legs" in second.best.worst
+    assert least_clearance_by_sampling(second.design, margin, 40_000) < 0.2
+    assert second.spare < 0.0
+    assert "clearance of legs" in second.worst
 
 
 def test_optimum_in_a_kink_of_the_volume_converges() -> None:

@@ -229,7 +229,7 @@ def outcome_json(outcome: outcomes.Outcome, written: Sequence[Path]) -> dict[str
         "runs": [
             {
                 "status": start.status,
-                "objective": start.best.objective,
+                "objective": outcome.history[start.best].objective,
                 **output.attributes(start, "iterations attempts"),
             }
             for start in outcome.runs

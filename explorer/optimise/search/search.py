@@ -25,7 +25,7 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_apart, format_number
-from explorer.optimise.outcome import Iterate, Phase, Run, Status
+from explorer.optimise.outcome import Iterate, Phase, Run, Status, reached_text
 from explorer.optimise.problem import Problem
 from explorer.optimise.search.clearance_demand import UnprovenClearance
 from explorer.optimise.search.demands import MET
@@ -100,16 +100,18 @@ class Search:
                 f"no design within the bounds was found with a volume of {asked}; the largest "
                 f"found is {found}"
             )
-        return Run(
+        run = Run(
             start=self.start,
             status=chosen.status,
-            best=chosen.best,
+            best=chosen.best.number,
             iterations=self.steps,
             evaluations=self.evaluations,
             attempts=len(attempts),
             holding=chosen.holding,
             reason=reason,
         )
+        message = run.words(reached_text(self.problem, chosen.best))
+        return msgspec.structs.replace(run, message=message)
 
     def _attempts(self) -> Iterator[Attempt]:
         """Yield one attempt after another, from the start and then from elsewhere."""
