@@ -28,6 +28,7 @@ BENCHMARKS: Mapping[str, str] = {
     "nearest": "nearest singular pose of all three incidences",
     "statics": "forces, bending, motions, errors and compliance in many poses",
     "optimise": "optimal designs: iterations, precision, time, random starts",
+    "find": "machines that keep a need: the first, the smallest, beside differential evolution",
     "studies": "many designs: a second, on two workers; memory of a million",
     "planning": "lines in the folds and paths between random poses of one mode",
     "orientation": "shares of orientations, greatest tilts at a position and over many",
