@@ -7,11 +7,11 @@ seed, has to find it in half of the usual time.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import repeat
 
 import msgspec
 import numpy as np
@@ -34,10 +34,10 @@ from explorer.optimise.search.sqp import Stop
 
 # Factor on a demand at which a machine is certified, and factors with room for a new search.
 CLOSE, ROOMS = 1.005, (1.03, 1.1, 1.3)
-# Candidates of each block that are improved.
-STARTS = 3
+# Candidates of each block that are improved, and machines of which the first one is the best.
+STARTS, ENOUGH = 3, 3
 # Seconds of the search for the first machine, and of a new search for what is told.
-FIRST, SECONDS_AGAIN = 5.0, 5.0
+FIRST, SECONDS_AGAIN = 6.0, 5.0
 # Factors on the tilt and the box from which they grow.
 SMALL = {"tilt_deg": 0.3, "box_mm": 0.5}
 # Largest half-angle of a joint's cone, in degrees.
@@ -64,7 +64,12 @@ def nearest_values(
     """
     checks.whole("seed", seed, 0, 2**31 - 1)
     left = UNITS_PER_SECOND * checks.positive("seconds", seconds)
-    fields, known = relaxable_fields(requirement), list[FloatArray]()
+    known = list[FloatArray]()
+    fields = [
+        field
+        for field in relaxable_fields(requirement)
+        if not impossible_demands(_left_out(requirement, field))
+    ]
     ends, terms = time.perf_counter() + PATIENCE * seconds, Terms.of(requirement)
     for index, field in enumerate(fields):
         # The first machine is sought longest, since others begin with it.
@@ -120,12 +125,18 @@ class _Nearest(Search):
 
         The known machines keep all demands but one, and are tried first.
         """
-        try:
-            found = next(filter(None, map(self.improve, self._openings(known), repeat(self.field))))
-        except Stop:
+        found: list[tuple[float, FloatArray]] = []
+        with contextlib.suppress(Stop):
+            for x in self._openings(known):
+                machine = self.improve(x, self.field)
+                found += [] if machine is None else [(self.factor, machine.x)]
+                if len(found) == (1 if known else ENOUGH):
+                    break
+        if not found:
             return None
-        known.append(found.x)
-        return self._told(self.factor)
+        factor, x = min(found, key=lambda each: each[0])
+        known.append(x)
+        return self._told(factor)
 
     def _told(self, factor: float) -> Relaxation | None:
         """Return a value with as little room as a new search needs; None if it finds nothing."""
@@ -157,7 +168,7 @@ class _Nearest(Search):
             return x
 
         yield from map(opened, known[::-1])
-        easy = _left_out(self.terms.requirement, self.field, size)
+        easy = _left_out(self.terms.requirement, self.field)
         for x, missed, large in candidates(Terms.of(easy), self.seed):
             self.spend(BLOCK_UNITS)
             order = np.argsort(np.log(large) + 4.0 * np.maximum(missed, 0.0))[:STARTS]
@@ -202,10 +213,10 @@ def _scaled(x: FloatArray, factor: float) -> FloatArray:
     return x
 
 
-def _left_out(requirement: Requirement, field: str, size: float) -> Requirement:
-    """Return a requirement without one demand, or with a tilt or a box of some size."""
+def _left_out(requirement: Requirement, field: str) -> Requirement:
+    """Return a requirement without one demand, or with a small tilt or box."""
     if field in SMALL:
-        return relaxed(requirement, field, 1.0 / size) or requirement
+        return relaxed(requirement, field, 1.0 / SMALL[field]) or requirement
     head, _, tail = field.partition(".")
     if tail:
         changed = {tail: 0.0 if tail == "apart_mm" else None}

@@ -86,7 +86,11 @@ def test_find_designs_cancelled_keep_what_was_found() -> None:
     assert (none.status, none.designs) == ("cancelled", ())
 
 
-def test_need_below_its_bound_is_refused_with_a_nearest_value_that_is_found() -> None:
+def test_need_below_its_bound_is_refused_with_a_nearest_value_that_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for module in ("find", "nearest"):
+        monkeypatch.setattr(f"explorer.find.{module}.PATIENCE", math.inf)
     short = msgspec.structs.replace(NEED.legs, longest_mm=200.0)
     requirement = msgspec.structs.replace(NEED, legs=short)
     # A refusal takes no search.
@@ -95,6 +99,9 @@ def test_need_below_its_bound_is_refused_with_a_nearest_value_that_is_found() ->
     assert not found.designs
     first = next(nearest_values(requirement))
     assert first.demand == "legs.longest_mm"
+    # Demands without which the others are impossible too are left alone.
+    swings = msgspec.structs.replace(requirement, swing_deg=1.0)
+    assert next(nearest_values(swings), None) is None
     assert found.bound_mm < first.value < 500.0
     seen: list[FoundDesigns] = []
     again = find_designs(first.requirement, seed=7, watch=seen.append, stop=lambda: bool(seen))

@@ -56,6 +56,16 @@ def test_improvement_for_a_field_keeps_all_other_demands(
         assert own.missed(improved.x, poses, np.array([0.0] * 4 + [8.0])) > 1e-3
 
 
+def test_balanced_machine_is_a_little_larger_than_the_smallest_and_transmits_far_better() -> None:
+    small, balanced = (
+        Improvement(TERMS, each, START).run(POSES).x for each in ("small", "balanced")
+    )
+    lengths = [float(np.max(TERMS.values(x, POSES).lengths)) for x in (small, balanced)]
+    indices = [float(np.min(TERMS.values(x, POSES).transmissions)) for x in (small, balanced)]
+    assert lengths[0] < lengths[1] < 1.35 * lengths[0]
+    assert indices[1] > 3.0 * indices[0]
+
+
 def test_improvement_leaves_an_amount_to_spare() -> None:
     improved = Improvement(TERMS, "small", START, spare=0.01).run(POSES)
     assert improved.missed <= 1e-5
