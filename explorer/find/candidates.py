@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.find import machine_values as m
-from explorer.find.demands import clearances_of, limits_of
+from explorer.find.demands import clearances_of, limits_of, sizes_of
 from explorer.find.machine_values import HOME, MachineValues
 from explorer.find.over_tilts import CORNERS, poses_over
 from explorer.find.terms import Terms, part_slacks
@@ -28,8 +28,9 @@ BLOCK = 8192
 AZIMUTHS = 8
 # Candidates that miss a demand by more than this are dropped after each look.
 NEARLY = 0.6
-# What counts as a whole miss: in the cosine of a swing, and of a margin over the longest leg.
-CONE, MARGIN = 0.6, 0.1
+# What counts as a whole miss: in the cosine of a swing, and of margins and the outer size over the
+# longest leg.
+CONE, MARGIN, SIZE = 0.6, 0.1, 0.5
 
 
 def standard_poses(tilt: float) -> FloatArray:
@@ -50,8 +51,9 @@ def misses(terms: Terms, at: MachineValues) -> tuple[FloatArray, FloatArray]:
     found = [(longest / shortest).max(axis=1) / terms.ratio - 1.0, large / terms.longest - 1.0]
     if terms.distance > 0.0:
         at.distances = at.uncrossed_distances
-    for demand in (*limits_of(terms), *clearances_of(terms)):
-        share = {"swing": CONE, "clearance": terms.distance}.get(demand.name, MARGIN * large)
+    shares = {"swing": CONE, "clearance": terms.distance, "outer size": SIZE * large}
+    for demand in (*limits_of(terms), *sizes_of(terms), *clearances_of(terms)):
+        share = shares.get(demand.name, MARGIN * large)
         found.append(np.max([each.max(axis=1) for each in demand.missed(at)], axis=0) / share)
     if terms.parts is not None:
         tight = [np.asarray(each).min(axis=-1) for each in part_slacks(terms.parts, at.home)]

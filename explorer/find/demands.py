@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -111,6 +112,29 @@ def limits_of(terms: Terms) -> list[Demand]:
 def demands_of(terms: Terms) -> list[Demand]:
     """Return the demands that are proven over cells of poses."""
     return [*clearances_of(terms), *_of_actuators(terms)]
+
+
+def sizes_of(terms: Terms) -> Iterator[Demand]:
+    """Yield the demand of searches on the box about all joints, if there is one.
+
+    It asks for more than its largest edge: no joint is farther than half of that, along each axis,
+    from the middle of the joints at home.
+    """
+    most = terms.requirement.hull_mm
+
+    def farthest(at: MachineValues) -> list[Any]:
+        found: list[Any] = []
+        for axis in range(3):
+            home = [point[axis] for point in (*at.home.bases, *at.home.ends)]
+            middle = 0.5 * (reduce(np.maximum, home) + reduce(np.minimum, home))
+            ends = [point[axis] for point in (*at.bases, *at.ends)]
+            found.append(reduce(np.maximum, [m.size(each - middle) for each in ends]))
+        return found
+
+    if most is not None:
+        limit = 0.5 * most / terms.scale_mm
+        reserve = STEEP * limit
+        yield Demand("outer size", tuple("xyz"), farthest, limit, "mm", 1.0, reserve=reserve)
 
 
 def clearances_of(terms: Terms) -> Iterator[Demand]:

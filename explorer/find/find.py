@@ -30,7 +30,6 @@ from explorer.mechanism.design import LENGTHS, Design
 from explorer.numerics import checks
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.search.sqp import Stop
-from explorer.prototype.fitting import buildability
 
 # Units of work in a second: about those of one core of a laptop.
 UNITS_PER_SECOND = 250.0
@@ -178,8 +177,7 @@ class Search:
         """Return a machine with its certificate, of the preferred kind; None if it fails."""
         self.spend(CERTIFICATE_UNITS)
         certificate = certify(x, self.terms, cells=CELLS)
-        is_kept = certificate.is_kept
-        if not is_kept or (self.terms.parts and not fits(x, self.terms, certificate)):
+        if not is_kept(x, self.terms, certificate):
             return None
         poses, kind = standard_poses(self.terms.tilt), self.kinds[0]
         cost = Improvement(self.terms, kind, x).cost(poses)
@@ -216,8 +214,8 @@ class Search:
             self.spend(CERTIFICATE_UNITS)
             found = self.certify(x, poses)
             if found.is_kept:
-                is_built = self.terms.parts is None or fits(x, self.terms, found)
-                return Machine(x, found, improved.cost, kind, poses) if is_built else None
+                is_machine = is_kept(x, self.terms, found)
+                return Machine(x, found, improved.cost, kind, poses) if is_machine else None
             # Legs that cross between the poses stay crossed.
             crossed = found.missed[found.rows("clearance")] > CROSSED * self.terms.distance
             if crossed.any():
@@ -305,10 +303,12 @@ def find_designs(
     return found if found.designs else replace(found, status=status)
 
 
-def fits(x: FloatArray, terms: Terms, certificate: Certificate) -> bool:
-    """Return whether the parts of a machine fit, and the strokes of its legs are those of rods."""
-    built = buildability(design_of(x, terms, certificate.ranges, "machine"))
-    return not built.problems and not built.short_legs
+def is_kept(x: FloatArray, terms: Terms, certificate: Certificate) -> bool:
+    """Return whether a machine keeps all demands, those on its size, moves and parts too."""
+    if not certificate.is_kept:
+        return False
+    design = design_of(x, terms, certificate.ranges, "machine")
+    return check_machine(design, x, terms, certificate).kept
 
 
 def _never() -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 
 from explorer.find import machine_values as m
 from explorer.find.certificate import lengths_over
-from explorer.find.demands import demands_of, limits_of
+from explorer.find.demands import demands_of, limits_of, sizes_of
 from explorer.find.requirement import Preference
 from explorer.find.terms import ROOM, Parts, Terms, part_slacks
 from explorer.numerics.arrays import FloatArray
@@ -128,7 +128,8 @@ class Improvement:
         before_each: Callable[[], None] = lambda: None,
         spare: float = 0.0,
     ) -> None:
-        every, self.spare, self.start = [*limits_of(terms), *demands_of(terms)], spare, start
+        every = [*limits_of(terms), *sizes_of(terms), *demands_of(terms)]
+        self.spare, self.start = spare, start
         self.relaxed = [each for each in every if each.name == RELAXED.get(aim)]
         self.demands = [each for each in every if each.name != RELAXED.get(aim)]
         self.factor = GROWING.get(aim)

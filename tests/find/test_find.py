@@ -36,6 +36,7 @@ POSES = 50_000
         {"gravity": (0.0, 0.0, 1.0), "prefer": "small"},
         {"tilt_deg": 0.0, "box_mm": (60.0, 60.0, 240.0)},
         {"free": ("orientation", "tool"), "buildable": True},
+        {"hull_mm": 600.0},
         {"payload": msgspec.structs.replace(NEED.payload, mass_kg=0.0, force_n=0.0)},
     ],
 )
