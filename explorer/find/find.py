@@ -154,20 +154,22 @@ class Search:
                     yield kept
             score = np.log(large) + 4.0 * np.maximum(missed, 0.0)
             order = np.argsort(score)[: IMPROVED if first else IMPROVED // 2]
-            before, others = self.best.get(self.kinds[0]), self.kinds[1:] if first else ()
+            before = self.best.get(self.kinds[0])
             for row in order:
                 yield x[row], self.kinds[0]
                 best = self.best.get(self.kinds[0])
                 if best is not None and best is not before:
-                    for kind in others:
-                        yield best.x, kind
-                    others = ()
+                    before = best
+                    # What fails from one machine may succeed from another.
+                    for kind in (*self.kinds, *self.kinds):
+                        if kind not in self.best:
+                            others = [*self.best.values()]
+                            yield others[random.integers(len(others))].x, kind
             first = False
             for kind in self.kinds:
                 if self.best:
-                    best = self.best.get(kind) or min(
-                        self.best.values(), key=lambda each: each.cost
-                    )
+                    others = [*self.best.values()]
+                    best = self.best.get(kind) or others[random.integers(len(others))]
                     yield best.x if kind not in self.best else self._shake(best.x, random), kind
             if self.kinds[0] in self.best:
                 for _ in SHAKES:

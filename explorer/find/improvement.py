@@ -61,7 +61,7 @@ WEIGHTS: Mapping[Preference, Mapping[int, float]] = MappingProxyType(
         "stiff": {LENGTH: 0.2, STIFFNESS: 1.0},
         "precise": {LENGTH: 0.2, ERROR: 1.0},
         "far-from-singular": {LENGTH: 0.2, SINGULAR: 1.0},
-        "easy-to-build": {LENGTH: 0.5, CLEARANCE: 1.0},
+        "easy-to-build": {LENGTH: 1.0, CLEARANCE: 0.5, SINGULAR: 0.1},
     }
 )
 """Exponents of the quantities whose product a preference makes least."""
