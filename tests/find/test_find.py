@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import msgspec
@@ -47,6 +48,9 @@ def test_find_designs_keep_the_requirement_in_all_poses(changes: dict[str, objec
     assert found.status == "found"
     assert seen
     assert not sum(violations(each.design, requirement, POSES) for each in found.designs)
+    rows = [(each.longest_mm, each.force_per_newton, each.clearance_mm) for each in found.designs]
+    for one, other in itertools.combinations(rows, 2):
+        assert np.abs(np.log(np.divide(one, other))).max() > 0.05
     for each in found.designs:
         assert each.check.kept
         again = decode_design(encode_design(each.design), "it")
