@@ -32,7 +32,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.optimise.search.sqp import Stop
 
 # Units of work in a second: about those of one core of a laptop.
-UNITS_PER_SECOND = 250.0
+UNITS_PER_SECOND = 240.0
 # Units of a block of candidates, of one evaluation of a machine, and of a certificate.
 BLOCK_UNITS, EVALUATION_UNITS, CERTIFICATE_UNITS = 50.0, 1.0, 20.0
 # Factor on the seconds after which a search ends on a slow machine all the same.
@@ -211,7 +211,10 @@ class Search:
             search = Improvement(self.terms, kind, x, lambda: self.spend(EVALUATION_UNITS), spare)
             improved = search.run(poses)
             x = improved.x
-            if improved.missed > NEARLY or not is_regular(x):
+            known = self.best.get(kind)
+            # What further poses demand does not lower the cost.
+            is_worse = known is not None and improved.cost >= known.cost
+            if is_worse or improved.missed > NEARLY or not is_regular(x):
                 return None
             self.spend(CERTIFICATE_UNITS)
             found = self.certify(x, poses)
@@ -231,8 +234,8 @@ class Search:
     def finish(self) -> None:
         """Certify the best machines with more cells; improve those again that miss a demand."""
         self.units = math.inf
-        for kind, found in list(self.best.items()):
-            last: Machine | None = found
+        for kind in list(self.best):
+            last: Machine | None = self.best.pop(kind)
             while last is not None:
                 certificate = certify(last.x, self.terms)
                 if certificate.is_kept:
@@ -242,8 +245,6 @@ class Search:
                     last = self._improve(last.x, kind, certificate, last.poses)
                 except Stop:
                     last = None
-            if last is None:
-                del self.best[kind]
 
 
 def find_designs(

@@ -171,8 +171,10 @@ class Improvement:
             rows += self._parts(terms.parts, shortest, at)
         for bound, each in zip(bounds.T[5:, :, None], self._lowered(at, shortest), strict=True):
             rows += [bound - value for value in each]
-        shape = (len(x), len(poses))
-        return np.stack([np.broadcast_to(row, shape) for row in rows], axis=1)
+        found = np.empty((len(x), len(rows), len(poses)), dtype=x.dtype)
+        for index, row in enumerate(rows):
+            found[:, index] = row
+        return found
 
     def _parts(self, parts: Parts, shortest: Any, at: m.MachineValues) -> list[FloatArray]:
         """Return the slacks of the distances that the parts need at home, and of the strokes."""

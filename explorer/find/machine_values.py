@@ -206,27 +206,28 @@ class MachineValues:
         return [part / length for part, length in zip(self.along_home, lengths, strict=True)]
 
     @cached_property
-    def distances(self) -> list[Any]:
+    def distances(self) -> Any:
         """The distances of the axes of the six pairs of legs, in the order of `PAIRS`."""
-        return [distance for distance, _ in self._closest]
+        return self._closest[0]
 
     @property
-    def uncrossed_distances(self) -> list[Any]:
+    def uncrossed_distances(self) -> FloatArray:
         """The distances of the pairs, negative where two legs have crossed.
 
         They have if they pass each other on the other side than at home.
         """
-        return [
-            np.where(side * at_home < 0.0, -distance, distance)
-            for (distance, side), (_, at_home) in zip(
-                self._closest, self.home._closest, strict=True
-            )
-        ]
+        (distances, sides), (_, at_home) = self._closest, self.home._closest
+        return np.where(sides * at_home < 0.0, -distances, distances)
 
     @cached_property
-    def _closest(self) -> list[tuple[Any, FloatArray]]:
-        legs = [*zip(self.bases, self.legs, strict=True)]
-        return [_distance(*legs[i - 1], *legs[j - 1]) for i, j in PAIRS]
+    def _closest(self) -> tuple[FloatArray, FloatArray]:
+        """The distances of all pairs, and on which side the first leg passes, (6, ..., k) each."""
+        ends = np.empty((2, 4, 3, *self.p[0].shape), dtype=self.p[0].dtype)
+        for leg, pair in enumerate(zip(self.bases, self.legs, strict=True)):
+            for axis in range(3):
+                ends[0, leg, axis], ends[1, leg, axis] = pair[0][axis], pair[1][axis]
+        (a, u), (b, v) = (np.moveaxis(ends[:, rows], 2, 1) for rows in PAIR_ROWS)
+        return _distance(a, u, b, v)
 
     def forces(self, force: Vec, moment: Vec) -> list[Any]:
         """Return the actuators' forces that hold a wrench about b4, in the order of the joints."""
@@ -268,6 +269,9 @@ class MachineValues:
         return [1.0 / longest(each) for each in own]
 
 
+PAIR_ROWS = np.array(PAIRS).T - 1
+"""The first and the second legs of the pairs, from 0."""
+
 UNITS: list[Vec] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
 
 
@@ -287,18 +291,20 @@ def _axes(x: list[Any]) -> tuple[Vec, Vec, Vec]:
     return u, v, cross(u, v)
 
 
-def _distance(a: Vec, u: Vec, b: Vec, v: Vec) -> tuple[Any, FloatArray]:
-    """Return the distance of the segments from a by u and from b by v, and the side of the first.
+def _distance(
+    a: FloatArray, u: FloatArray, b: FloatArray, v: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the distance of segments (3, ...) from a by u and from b by v, and the first's side.
 
     The side is 1 or −1 if the closest points lie within both, and else 0. Where they lie changes
     the distance to second order alone, so that it may be found from the real parts.
     """
-    r = minus(a, b)
-    real: list[Vec] = [(e[0].real, e[1].real, e[2].real) for e in (u, v, r)]
-    s, t = closest_shares(*real)
+    r = a - b
+    s, t = closest_shares(u.real, v.real, r.real)
     inner = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
-    side = np.where(inner, np.sign(dot(real[2], cross(real[0], real[1]))), 0.0)
-    return norm(plus(r, minus(times(s, u), times(t, v)))), side
+    across: Any = cross(u.real, v.real)
+    side = np.where(inner, np.sign(dot(r.real, across)), 0.0)
+    return norm(r + s * u - t * v), side
 
 
 def closest_shares(u: Any, v: Any, r: Any) -> tuple[FloatArray, FloatArray]:
