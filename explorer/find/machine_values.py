@@ -291,9 +291,7 @@ def _axes(x: list[Any]) -> tuple[Vec, Vec, Vec]:
     return u, v, cross(u, v)
 
 
-def _distance(
-    a: FloatArray, u: FloatArray, b: FloatArray, v: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _distance(a: Any, u: Any, b: Any, v: Any) -> tuple[FloatArray, FloatArray]:
     """Return the distance of segments (3, ...) from a by u and from b by v, and the first's side.
 
     The side is 1 or −1 if the closest points lie within both, and else 0. Where they lie changes
@@ -302,8 +300,7 @@ def _distance(
     r = a - b
     s, t = closest_shares(u.real, v.real, r.real)
     inner = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
-    across: Any = cross(u.real, v.real)
-    side = np.where(inner, np.sign(dot(r.real, across)), 0.0)
+    side = np.where(inner, np.sign(dot(r.real, cross(u.real, v.real))), 0.0)
     return norm(r + s * u - t * v), side
 
 
