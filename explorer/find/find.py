@@ -217,9 +217,8 @@ class Search:
             if is_worse or improved.missed > NEARLY or not is_regular(x):
                 return None
             self.spend(CERTIFICATE_UNITS)
-            found = self.certify(x, poses)
+            found, is_machine = self.certify(x, poses)
             if found.is_kept:
-                is_machine = is_kept(x, self.terms, found)
                 return Machine(x, found, improved.cost, kind, poses) if is_machine else None
             # Legs that cross between the poses stay crossed.
             crossed = found.missed[found.rows("clearance")] > CROSSED * self.terms.distance
@@ -227,9 +226,13 @@ class Search:
                 return None
         return None
 
-    def certify(self, x: FloatArray, poses: FloatArray) -> Certificate:
-        """Return the certificate of an improved machine, quick if it misses a limit."""
-        return certify(x, self.terms, cells=CELLS, poses=poses, is_quick=True)
+    def certify(self, x: FloatArray, poses: FloatArray) -> tuple[Certificate, bool]:
+        """Return the certificate of an improved machine, and whether it keeps all demands.
+
+        The certificate is quick if a limit is missed.
+        """
+        found = certify(x, self.terms, cells=CELLS, poses=poses, is_quick=True)
+        return found, is_kept(x, self.terms, found)
 
     def finish(self) -> None:
         """Certify the best machines with more cells; improve those again that miss a demand."""

@@ -23,7 +23,15 @@ from explorer.find.bound import impossible_demands
 from explorer.find.candidates import candidates
 from explorer.find.certificate import Certificate, certify, lengths_over
 from explorer.find.demands import demands_of, limits_of
-from explorer.find.find import BLOCK_UNITS, CELLS, PATIENCE, UNITS_PER_SECOND, Search, find_designs
+from explorer.find.find import (
+    BLOCK_UNITS,
+    CELLS,
+    PATIENCE,
+    UNITS_PER_SECOND,
+    Search,
+    find_designs,
+    is_kept,
+)
 from explorer.find.improvement import GROWING, RELAXED
 from explorer.find.requirement import MOST_TILT, Requirement
 from explorer.find.terms import Terms
@@ -175,8 +183,8 @@ class _Nearest(Search):
             for row in x[order]:
                 yield opened(_scaled(row, size) if self.field == "box_mm" else row)
 
-    def certify(self, x: FloatArray, poses: FloatArray) -> Certificate:
-        """Return the certificate of a machine for the value that it asks for, and a little more."""
+    def certify(self, x: FloatArray, poses: FloatArray) -> tuple[Certificate, bool]:
+        """Return the same for the value that a machine asks for, and a little more."""
         self.factor = self._factor(x, poses)
         asked = relaxed(self.terms.requirement, self.field, max(1.0, self.factor) * CLOSE)
         scales = np.array([1.0, 1.0, 1.0, 1.0, x[m.TILT]])
@@ -184,7 +192,7 @@ class _Nearest(Search):
         moved[m.TILT] = moved[m.SIZE] = 1.0
         own = self.terms if asked is None else Terms.of(asked)
         found = certify(moved, own, cells=CELLS, poses=poses * scales, is_quick=True)
-        return replace(found, poses=found.poses / scales)
+        return replace(found, poses=found.poses / scales), is_kept(moved, own, found)
 
     def _factor(self, x: FloatArray, poses: FloatArray) -> float:
         """Return the factor on the demand that a machine asks for in poses."""
