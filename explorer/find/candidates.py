@@ -7,7 +7,7 @@ largest tilts.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -23,7 +23,8 @@ LOWS = np.array(
     [-2.5, -2.5, *[-1.2] * 4, -2.0, -2.0, 0.1, *[-math.pi] * 2, -1.0, -1.0, *[-0.8] * 3]
 )
 HIGHS = np.array([2.5, 2.5, *[1.2] * 4, 2.0, 2.0, 2.5, *[math.pi] * 2, 1.0, 1.0, *[0.8] * 3])
-BLOCK = 8192
+# Machines of a block, and its parts, whose arrays are small enough to be had at once.
+BLOCK, PARTS = 8192, 4
 # Azimuths of the tilts at which the corners are looked at.
 AZIMUTHS = 8
 # Candidates that miss a demand by more than this are dropped after each look.
@@ -77,11 +78,19 @@ def candidates(terms: Terms, seed: int) -> Iterator[tuple[FloatArray, FloatArray
         if "orientation" not in terms.requirement.free:
             is_level[:] = True
         x[is_level, m.PITCH : m.TX] = 0.0
-        missed = np.zeros(len(x))
-        large = missed
-        for look in looks:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                missed, large = misses(terms, terms.values(x, look))
-            kept = missed < NEARLY
-            x, missed, large = x[kept], missed[kept], large[kept]
+        found = [_looked_at(part, terms, looks) for part in np.split(x, PARTS)]
+        x, missed, large = map(np.concatenate, zip(*found, strict=True))
         yield x, missed, large
+
+
+def _looked_at(
+    x: FloatArray, terms: Terms, looks: Sequence[FloatArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the machines that are not dropped after any look at poses, with `misses`."""
+    missed, large = np.zeros((2, len(x)))
+    for look in looks:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            missed, large = misses(terms, terms.values(x, look))
+        kept = missed < NEARLY
+        x, missed, large = x[kept], missed[kept], large[kept]
+    return x, missed, large

@@ -13,7 +13,7 @@ import numpy as np
 from explorer.find import machine_values as m
 from explorer.find.candidates import standard_poses
 from explorer.find.demands import demands_of, limits_of
-from explorer.find.over_poses import look_at, prove_demand, sample_demand
+from explorer.find.over_poses import look_at, prove_demand, sample_demand, worsened
 from explorer.find.over_tilts import prove_limits
 from explorer.find.terms import Terms
 from explorer.mechanism.design import LENGTHS
@@ -108,8 +108,9 @@ def certify(
     """Return the certificate of a machine with limits of its lengths, or with those that it uses.
 
     Without limits given, the lengths have to keep the ratio and the longest leg. At most `cells`
-    cells of poses are looked at for each demand; a quick certificate looks at none if a limit is
-    missed. Demands are also looked at in some poses.
+    cells of poses are looked at for each demand; without a number their worst values are sought
+    closely too. A quick certificate looks at no cells if a limit is missed. Demands are also looked
+    at in some poses.
     """
     poses = standard_poses(terms.tilt) if poses is None else poses
     limits, demands = limits_of(terms), demands_of(terms)
@@ -130,6 +131,8 @@ def certify(
                 part.bounds[:] = math.inf
             else:
                 part = part.merged(prove_demand(demand, x, terms, cells))
+                if cells is None:
+                    part = part.merged(worsened(demand, x, terms, part))
                 if part.values.max() <= TOLERANCE < part.bounds.max():
                     part = part.merged(sample_demand(demand, x, terms, SAMPLES))
             parts.append(part)

@@ -32,7 +32,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.optimise.search.sqp import Stop
 
 # Units of work in a second: about those of one core of a laptop.
-UNITS_PER_SECOND = 240.0
+UNITS_PER_SECOND = 150.0
 # Units of a block of candidates, of one evaluation of a machine, and of a certificate.
 BLOCK_UNITS, EVALUATION_UNITS, CERTIFICATE_UNITS = 50.0, 1.0, 20.0
 # Factor on the seconds after which a search ends on a slow machine all the same.

@@ -351,6 +351,7 @@ def test_first_design_can_be_built_and_keeps_the_requirement_of_the_form() -> No
     design = PRESETS[FIRST_DESIGN]
     check = check_requirement(design, EXAMPLE)
     assert check.kept, [demand.words for demand in check.missed]
+    assert check.proven
     numbers = [n for each in check.demands for n in (each.worst, each.limit, each.spare)]
     assert {*map(type, numbers)} == {float}
     assert {type(each.kept) for each in check.demands} == {bool}

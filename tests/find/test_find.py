@@ -140,6 +140,14 @@ def test_check_of_the_papers_optimum_tells_what_it_misses_and_where() -> None:
         assert length == pytest.approx(worst.worst, rel=1e-6)
 
 
+def test_worst_values_are_no_milder_than_those_of_random_poses() -> None:
+    design = PRESETS["buildable"]
+    worst = {each.name: each.worst for each in check_requirement(design, NEED).demands}
+    clearance, force = worst["clearance"] - 1e-3, worst["force"] + 1e-3
+    legs = msgspec.structs.replace(NEED.legs, apart_mm=clearance, push_n=force, pull_n=force)
+    assert violations(design, msgspec.structs.replace(NEED, legs=legs), 200_000) == 0
+
+
 def test_requirement_file_is_read_back_and_strict() -> None:
     assert decode_requirement(encode_requirement(NEED), "it") == NEED
     with pytest.raises(InputError, match="tilt"):
