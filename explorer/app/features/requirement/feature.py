@@ -118,7 +118,7 @@ class RequirementPanel:
         is_on = finder.job is not None
         yield self._find, "visible", not is_on
         yield self._cancel, "visible", is_on
-        yield self._check, "visible", not part.is_checked
+        yield self._check, "disabled", part.is_checked
         look = "" if finder.requirement == part.form else "is-outdated"
         content = "".join(words.result(finder.found, is_searching=is_on))
         yield self._result, "content", box(f'<div class="{look}">{content}</div>')
