@@ -235,8 +235,9 @@ def _impossible(requirement: Requirement) -> Iterator[str]:
             f"{requirement.tilt_deg:g}°: about some axis it turns leg 4 by as much, and its joints "
             f"need more than {share}that"
         )
+        least = 0.0
     elif legs.longest_mm is not None and legs.longest_mm < least:
-        yield f"no machine has legs below {rounded_down(least)} mm"
+        yield f"no machine has legs below {round_down(least)} mm"
     if requirement.buildable and 0.0 < 0.5 * legs.diameter_mm < THINNEST_LEG:
         yield f"no leg is built thinner than {2.0 * THINNEST_LEG:g} mm"
     if legs.push_n is not None:
@@ -244,7 +245,7 @@ def _impossible(requirement: Requirement) -> Iterator[str]:
         most = (2.0 + math.sqrt(8.0)) * max(legs.push_n, legs.pull_n or 0.0)
         load = payload.mass_kg * STANDARD_GRAVITY + payload.force_n
         if load > most:
-            yield f"no machine holds more than {rounded_down(most)} N with actuators of that force"
+            yield f"no machine holds more than {round_down(most)} N with actuators of that force"
     fastest, change = legs.speed_mm_s or math.inf, legs.acceleration_mm_s2 or math.inf
     if requirement.tool.speed_mm_s > fastest:
         speed = f"{fastest:g} mm/s"
@@ -255,7 +256,7 @@ def _impossible(requirement: Requirement) -> Iterator[str]:
         speed = min(fastest, math.sqrt(way * change))
         least_s = way / speed + speed / change
         if least_s > requirement.move_s:
-            words = f"{way:g} mm along the guide in less than {rounded_down(least_s)} s"
+            words = f"{way:g} mm along the guide in less than {round_down(least_s)} s"
             yield f"no carriage moves {words}"
     if requirement.error_mm is not None and requirement.error_mm < legs.error_mm:
         yield f"no machine has an error below that of its actuators, {legs.error_mm:g} mm"
@@ -263,17 +264,17 @@ def _impossible(requirement: Requirement) -> Iterator[str]:
         # The squares of the six directions' parts along some direction add up to 2 at most.
         bend = 0.5 * payload.force_n / legs.stiffness_n_mm
         if requirement.deflection_mm < bend:
-            least_mm = rounded_down(bend)
+            least_mm = round_down(bend)
             yield f"no machine with actuators of that stiffness deflects less than {least_mm} mm"
     if requirement.hull_mm is not None:
         a, b, c = box
         flat = min(max(a, b), (a + b) / math.sqrt(2.0))
         edge = max(flat, c + requirement.least_margin_mm, least / math.sqrt(3.0))
         if requirement.hull_mm < edge:
-            yield f"no machine is smaller than {rounded_down(edge)} mm along all axes"
+            yield f"no machine is smaller than {round_down(edge)} mm along all axes"
 
 
-def rounded_down(value: float) -> str:
-    """Return a number above zero with four digits, not above it."""
+def round_down(value: float) -> str:
+    """Return a number above zero with four digits, not above it but for rounding."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
-    return f"{math.floor(value / step) * step:.6g}"
+    return f"{math.floor(value / step + 1e-9) * step:.6g}"

@@ -12,10 +12,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.errors import InputError
 from explorer.find import machine_values as m
 from explorer.find.answers import DemandCheck, RequirementCheck
-from explorer.find.certificate import LENGTH, SAMPLES, Certificate, certify, lengths_over
+from explorer.find.candidates import standard_poses
+from explorer.find.certificate import (
+    LENGTH,
+    SAMPLES,
+    Certificate,
+    certify,
+    lengths_over,
+    used_ranges,
+)
 from explorer.find.demands import Demand, demands_of, limits_of
 from explorer.find.over_tilts import CORNERS, poses_over
 from explorer.find.requirement import Requirement
@@ -44,9 +51,13 @@ def check_requirement(design: Design, requirement: Requirement) -> RequirementCh
     terms = Terms.of(requirement)
     x = row_of(design, terms)
     scale = design.unit_mm / terms.scale_mm
-    ranges = scale * np.array([design.length_range(name) for name in LENGTHS])
-    ranges[:, 1] = np.minimum(ranges[:, 1], terms.longest)
-    ranges = ranges + CLOSE * np.array([-1.0, 1.0])
+    low, high = scale * np.array([design.length_range(name) for name in LENGTHS]).T
+    # Limits beyond what the box needs would leave the worst lengths unknown.
+    with np.errstate(all="ignore"):
+        used = used_ranges(x, terms, standard_poses(terms.tilt))
+    low = np.maximum(low - CLOSE, used[:, 0])
+    high = np.minimum(np.minimum(high, terms.longest) + CLOSE, used[:, 1])
+    ranges = np.column_stack([low, high])
     return check_machine(design, x, terms, certify(x, terms, ranges=ranges))
 
 
@@ -86,12 +97,12 @@ class _Check:
 
     def _lengths(self) -> Iterator[DemandCheck]:
         """Yield the lengths within the design's own limits, the ratio and the longest leg."""
-        found, terms, size = self.found, self.terms, self.terms.scale_mm
-        lengths, own = lengths_over(self.x, terms, found.poses[:8]), found.ranges
-        pairs = [*lengths[:, 1], *lengths[:, 0]], [*own[:, 1], *own[:, 0]]
-        used, limits = (size * np.array(each) for each in pairs)
+        found, terms, own = self.found, self.terms, self.found.ranges
+        used = terms.scale_mm * lengths_over(self.x, terms, found.poses[:8]).T[::-1].ravel()
+        ends = np.array([self.design.length_range(name) for name in LENGTHS])
+        limits = self.design.unit_mm * ends.T[::-1].ravel()
         proven = bool(found.proven[:8].all())
-        row = int(found.missed[:8].argmax())
+        row = int(((used - limits) * np.repeat([1.0, -1.0], 4)).argmax())
         yield self._row(LENGTH, row, used, limits[row], "mm", proven, is_least=row >= 4)
         if math.isfinite(terms.ratio):
             is_bought = bool((own[:, 1] <= terms.ratio * (1.0 + 1e-5) * own[:, 0]).all())
@@ -174,8 +185,6 @@ class _Check:
         """Return the check of the time along the diagonals of the box at home's orientation."""
         legs, design = self.terms.requirement.legs, self.design
         speed, change = legs.speed_mm_s or math.inf, legs.acceleration_mm_s2 or math.inf
-        if min(speed, change) == math.inf:
-            raise InputError("move_s needs legs.speed_mm_s or legs.acceleration_mm_s2")
         times: list[float] = []
         for corner in CORNERS[:4]:
             ends = poses_over(np.array([corner, -corner]), np.zeros((1, 2)))

@@ -175,7 +175,8 @@ def _of_actuators(terms: Terms) -> Iterator[Demand]:
     ) -> Demand:
         return Demand(name, items, values, 1.0, unit, limit, reserve=STEEP, is_singular=True)
 
-    if (push := legs.push_n) is not None and (payload.mass_kg or force):
+    if (legs.push_n or legs.pull_n) and (payload.mass_kg or force):
+        push = legs.push_n or math.inf
         pull = legs.pull_n or push
 
         def forces(at: MachineValues) -> list[Any]:

@@ -8,6 +8,7 @@ that a search with the same seed finds the same machines.
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -21,7 +22,7 @@ from explorer.find.bound import impossible_demands, least_longest_mm
 from explorer.find.candidates import candidates, standard_poses
 from explorer.find.certificate import Certificate, certify, is_regular, lengths_over
 from explorer.find.check import check_machine
-from explorer.find.demands import demands_of
+from explorer.find.demands import demands_of, limits_of
 from explorer.find.improvement import Improvement, free_variables
 from explorer.find.over_tilts import nearest_poses
 from explorer.find.requirement import PREFERENCES, Preference, Requirement
@@ -142,8 +143,9 @@ class Search:
                 yield as_it_is
             for kind in self.kinds:
                 yield start, kind
-            while True:
-                yield self._shake(start, random), self.kinds[0]
+            for kind in itertools.cycle(self.kinds):
+                best = self.best.get(kind)
+                yield self._shake(start if best is None else best.x, random), kind
         first = True
         for x, missed, large in candidates(self.terms, self.seed):
             self.spend(BLOCK_UNITS)
@@ -344,7 +346,8 @@ def _answer(found: Machine, terms: Terms, base: Design | None) -> FoundDesign:
     )
 
 
-# Demands with less than this to spare, over the diagonal or over their limit, bind a design.
+# Demands with less than this to spare beside the reserve of the search, over the diagonal or over
+# their limit, bind a design.
 BINDING = 5e-3
 
 
@@ -352,7 +355,17 @@ def _binding(found: Machine, terms: Terms) -> tuple[str, ...]:
     """Return the names of the demands that bind a machine."""
     certificate = found.certificate
     ratios = certificate.ranges[:, 1] / certificate.ranges[:, 0]
+    reserve = {each.name: each.reserve for each in (*limits_of(terms), *demands_of(terms))}
     rows = zip(certificate.names[8:], certificate.items[8:], certificate.missed[8:], strict=True)
-    binding = [f"{name} {item}".strip() for name, item, each in rows if each > -BINDING]
-    legs = zip(LENGTHS, ratios.tolist(), strict=True)
-    return (*(f"ratio {n}" for n, each in legs if each > terms.ratio * (1 - BINDING)), *binding)
+    binding = [
+        f"{name} {item}".strip() for name, item, each in rows if each > -BINDING - reserve[name]
+    ]
+    limits = [("ratio", ratios, terms.ratio)]
+    limits.append(("longest leg", certificate.ranges[:, 1], terms.longest))
+    legs = [
+        f"{name} {leg}"
+        for name, values, most in limits
+        for leg, value in zip(LENGTHS, values.tolist(), strict=True)
+        if value > most * (1.0 - BINDING)
+    ]
+    return (*legs, *binding)

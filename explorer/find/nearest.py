@@ -33,7 +33,7 @@ from explorer.find.find import (
     is_kept,
 )
 from explorer.find.improvement import GROWING, RELAXED
-from explorer.find.requirement import MOST_TILT, Requirement
+from explorer.find.requirement import Requirement
 from explorer.find.terms import Terms
 from explorer.mechanism.design import Design
 from explorer.numerics import checks
@@ -44,8 +44,8 @@ from explorer.optimise.search.sqp import Stop
 CLOSE, ROOMS = 1.005, (1.03, 1.1, 1.3)
 # Candidates of each block that are improved, and machines of which the first one is the best.
 STARTS, ENOUGH = 3, 3
-# Seconds of the search for the first machine, and of a new search for what is told.
-FIRST, SECONDS_AGAIN = 6.0, 5.0
+# Seconds of a new search for what is told.
+SECONDS_AGAIN = 5.0
 # Factors on the tilt and the box from which they grow.
 SMALL = {"tilt_deg": 0.3, "box_mm": 0.5}
 # Largest half-angle of a joint's cone, in degrees.
@@ -55,7 +55,7 @@ MOST_SWING = 80.0
 def nearest_values(
     requirement: Requirement,
     *,
-    seconds: float = 20.0,
+    seconds: float = 30.0,
     seed: int = 0,
     stop: Callable[[], bool] | None = None,
 ) -> Iterator[Relaxation]:
@@ -80,8 +80,7 @@ def nearest_values(
     ]
     ends, terms = time.perf_counter() + PATIENCE * seconds, Terms.of(requirement)
     for index, field in enumerate(fields):
-        # The first machine is sought longest, since others begin with it.
-        share = left / (len(fields) - index) if known else min(left, UNITS_PER_SECOND * FIRST)
+        share = left / (len(fields) - index)
         search = _Nearest(terms, (), share, ends, stop or (lambda: False), seed, field=field)
         told = search.nearest(known)
         left -= search.done
@@ -110,7 +109,7 @@ def find_or_relax(
     )
     if found.status in ("impossible", "none"):
         watch(found)
-        for each in nearest_values(requirement, seconds=2.0 * seconds, seed=seed, stop=stop):
+        for each in nearest_values(requirement, seconds=3.0 * seconds, seed=seed, stop=stop):
             found = replace(found, nearest=(*found.nearest, each))
             watch(found)
     return found
@@ -247,7 +246,10 @@ def relaxable_fields(requirement: Requirement) -> list[str]:
         head, _, tail = field.partition(".")
         return bool(getattr(requirement.legs, tail) if tail else getattr(requirement, head))
 
-    return [field for field in _WORDS if is_demanded(field)]
+    terms = Terms.of(requirement)
+    names = {each.name for each in (*limits_of(terms), *demands_of(terms))}
+    fields = (field for field in _WORDS if field not in RELAXED or RELAXED[field] in names)
+    return [field for field in fields if is_demanded(field)]
 
 
 def relaxed(requirement: Requirement, field: str, factor: float) -> Requirement | None:
@@ -257,15 +259,15 @@ def relaxed(requirement: Requirement, field: str, factor: float) -> Requirement 
     """
     head, _, tail = field.partition(".")
     own = getattr(requirement, head) if not tail else getattr(requirement.legs, tail)
+    if not math.isfinite(factor):
+        return None
     try:
         if field == "box_mm":
             value = tuple(_three_digits(edge / factor, up=False) for edge in own)
             return msgspec.structs.replace(requirement, box_mm=value)
         shrinks = field in ("tilt_deg", "legs.apart_mm", "transmission")
         value = _three_digits(own / factor if shrinks else own * factor, up=not shrinks)
-        if (field == "swing_deg" and value > MOST_SWING) or (
-            field == "tilt_deg" and value > MOST_TILT
-        ):
+        if field == "swing_deg" and value > MOST_SWING:
             return None
         if not tail:
             return msgspec.structs.replace(requirement, **{field: value})

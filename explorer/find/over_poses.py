@@ -74,12 +74,13 @@ def sample_demand(demand: Demand, x: FloatArray, terms: Terms, count: int) -> Ce
     poses = random.uniform(lows, highs, (count, 5))
     poses[::2, :3] = np.clip(2.0 * poses[::2, :3], -1.0, 1.0)
     poses[::2, 4] = terms.tilt
-    return worsened(demand, x, terms, look_at(demand, terms.values(x, poses)))
+    return search_near(demand, x, terms, poses)
 
 
-def worsened(demand: Demand, x: FloatArray, terms: Terms, found: CellValues) -> CellValues:
-    """Return by how much a demand is missed at most in random poses near the worst known ones."""
+def search_near(demand: Demand, x: FloatArray, terms: Terms, poses: FloatArray) -> CellValues:
+    """Return by how much a demand is missed at most in poses, and in random ones near the worst."""
     random, (lows, highs) = np.random.default_rng(0), ends_of(terms)
+    found = look_at(demand, terms.values(x, poses))
     for width in NARROWER:
         centres = np.repeat(found.places, NEAR, axis=0)
         near = centres + width * (highs - lows) * random.normal(size=centres.shape)

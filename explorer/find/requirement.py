@@ -8,6 +8,9 @@ orientation about any axis parallel to the base plane.
 from __future__ import annotations
 
 import math
+import re
+import unicodedata
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -224,49 +227,61 @@ def load_requirement(path: str | Path) -> Requirement:
     return decode_requirement(read_at_most(Path(path)), str(path))
 
 
-# Words of the columns of a data sheet, and the fields that they mean.
-_COLUMNS = {
-    "push": "push_n",
-    "pull": "pull_n",
-    "force": "push_n",
-    "speed": "speed_mm_s",
-    "acceleration": "acceleration_mm_s2",
-    "stiffness": "stiffness_n_mm",
-    "accuracy": "error_mm",
-    "error": "error_mm",
-    "diameter": "diameter_mm",
-    "ratio": "ratio",
+_LENGTHS = {"mm": 1.0, "m": 1e3, "μm": 1e-3, "um": 1e-3}
+_FORCES = {"N": 1.0, "kN": 1e3}
+_SPEEDS = {f"{unit}/s": factor for unit, factor in _LENGTHS.items()}
+_RATES = {f"{unit}2": factor for unit, factor in _SPEEDS.items()}
+_STIFFNESSES = {f"{f}/{unit}": n / mm for f, n in _FORCES.items() for unit, mm in _LENGTHS.items()}
+# Words of the columns of a data sheet, the fields that they mean, and the units of their values.
+_COLUMNS: Mapping[str, tuple[str, Mapping[str, float]]] = {
+    "push": ("push_n", _FORCES),
+    "pull": ("pull_n", _FORCES),
+    "force": ("push_n", _FORCES),
+    "speed": ("speed_mm_s", _SPEEDS),
+    "acceleration": ("acceleration_mm_s2", _RATES),
+    "stiffness": ("stiffness_n_mm", _STIFFNESSES),
+    "accuracy": ("error_mm", _LENGTHS),
+    "error": ("error_mm", _LENGTHS),
+    "diameter": ("diameter_mm", _LENGTHS),
+    "ratio": ("ratio", {}),
+    "stroke": ("stroke", _LENGTHS),
+    "retracted": ("retracted", _LENGTHS),
 }
+# A word, a number after it, and what follows, which may be a unit or the next word.
+_VALUE = re.compile(r"([A-Za-z]+)\)?\s*[:=]?\s*±?\s*(\d(?:[\d.,]*\d)?)(?=\s*([^\s,;]*))")
 
 
 def legs_from_row(text: str, legs: RequiredLegs) -> RequiredLegs:
     """Return legs with the values of a row of a data sheet in place of their own.
 
     The row states each value as a word out of push, pull, force, speed, acceleration, stiffness,
-    accuracy (or error), diameter and ratio and a number in N, mm/s, mm/s², N/mm or mm, such as
-    "push 300 N"; "stroke" and "retracted" give the ratio and the longest leg.
+    accuracy (or error), diameter and ratio, and a number with its unit, such as "push 300 N"; units
+    that are left out are those of the fields. "stroke" and "retracted" give the ratio and the
+    longest leg.
 
     Raises:
-        InputError: No value is found, or one is not a number.
+        InputError: No value is found, or one is no number or in another unit.
     """
-    words = text.replace(":", " ").replace(";", " ").replace(",", " ").replace("=", " ").split()
-    found: dict[str, float] = {}
-    lengths: dict[str, float] = {}
-    last = ""
-    for word in words:
-        key = word.strip("()").lower()
-        if key in _COLUMNS or key in ("stroke", "retracted"):
-            last = key
-        elif last:
-            try:
-                value = float(word.rstrip("Nms/²%"))
-            except ValueError:
-                continue
-            (found if last in _COLUMNS else lengths)[_COLUMNS.get(last, last)] = value
-            last = ""
-    if {"stroke", "retracted"} <= lengths.keys():
-        longest = lengths["stroke"] + lengths["retracted"]
-        found |= {"ratio": longest / lengths["retracted"], "longest_mm": longest}
+    found = dict[str, float]()
+    for word, number, after in _VALUE.findall(unicodedata.normalize("NFKC", text)):
+        field, units = _COLUMNS.get(word.lower(), ("", {}))
+        if not field:
+            continue
+        if after in units:
+            factor = units[after]
+        elif not after or after.lower() in _COLUMNS:
+            factor = 1.0
+        else:
+            allowed = f"in {', '.join(units)}" if units else "without a unit"
+            raise InputError(f"{word} is given {allowed}; got {number} {after}")
+        try:
+            found[field] = factor * float(number)
+        except ValueError:
+            raise InputError(f"{word} is a number such as 1500.5; got {number}") from None
+    stroke, retracted = found.pop("stroke", None), found.pop("retracted", None)
+    if stroke is not None and retracted is not None:
+        longest = stroke + checks.positive("retracted", retracted)
+        found |= {"ratio": longest / retracted, "longest_mm": longest}
     if not found:
         raise InputError(
             f"no value in {text!r}: name each, such as 'stroke 150 retracted 220 push 300 N speed "

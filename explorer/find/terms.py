@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from explorer.errors import InputError
 from explorer.find import machine_values as m
 from explorer.find.machine_values import MachineValues
 from explorer.find.requirement import Requirement
@@ -114,8 +115,16 @@ class Terms:
 
     @staticmethod
     def of(requirement: Requirement) -> Terms:
-        """Return the terms of a requirement."""
-        legs, scale = requirement.legs, requirement.diagonal_mm
+        """Return the terms of a requirement.
+
+        Raises:
+            InputError: A speed of the tool or a time is demanded of actuators without a speed.
+        """
+        legs, tool, scale = requirement.legs, requirement.tool, requirement.diagonal_mm
+        if (tool.speed_mm_s or tool.turning_deg_s) and legs.speed_mm_s is None:
+            raise InputError("tool.speed_mm_s and tool.turning_deg_s need legs.speed_mm_s")
+        if requirement.move_s and not (legs.speed_mm_s or legs.acceleration_mm_s2):
+            raise InputError("move_s needs legs.speed_mm_s or legs.acceleration_mm_s2")
 
         def most(value: float | None, unit: float = 1.0) -> float:
             return math.inf if value is None else value / unit

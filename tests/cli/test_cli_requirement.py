@@ -111,9 +111,9 @@ def test_find_impossible_is_refused_with_its_bound(cli: CommandLine, tmp_path: P
 def test_find_from_a_design_improves_it(cli: CommandLine, tmp_path: Path) -> None:
     need, out = write_need(tmp_path), tmp_path / "found"
     cli.has_progress = True
-    first = cli.answer("find", need, "--out", out, "--seconds", "0.3", "--count", "1")
+    first = cli.answer("find", need, "--out", out, "--seconds", "1", "--count", "1")
     start = first["designs"][0]
-    argv = ("--design", start["file"], "--seconds", "0.5", "--count", "1")
+    argv = ("--design", start["file"], "--seconds", "1", "--count", "1")
     better = cli.answer("find", need, "--out", tmp_path / "better", *argv)
     assert better["designs"][0]["longest_mm"] <= 1.01 * start["longest_mm"]
 

@@ -248,6 +248,8 @@ def test_impossible_demands_are_told_up_to_their_bounds(
     other_fields: dict[str, Any],
 ) -> None:
     assert len(impossible(legs, **fields)) == 1
+    # What follows from other clauses is told whatever these are.
+    assert impossible(legs, **fields | {"swing_deg": 1.0, "tilt_deg": 15.0, "hull_mm": 600.0})
     assert impossible(other_legs, **other_fields) == ()
 
 

@@ -18,11 +18,13 @@ from explorer.find.find import find_designs
 from explorer.find.nearest import nearest_values
 from explorer.find.requirement import (
     RequiredLegs,
+    RequiredMotion,
     Requirement,
     decode_requirement,
     encode_requirement,
     legs_from_row,
 )
+from explorer.mechanism.design import LENGTHS
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.prototype.fitting import buildability
 
@@ -164,5 +166,45 @@ def test_row_of_a_data_sheet_gives_its_values() -> None:
     )
     assert legs.ratio == pytest.approx(370.0 / 220.0)
     assert (legs.longest_mm, legs.push_n, legs.speed_mm_s) == (370.0, 300.0, 50.0)
-    with pytest.raises(InputError, match="no value"):
-        legs_from_row("LA-20, blue", RequiredLegs())
+    metric = legs_from_row("push 3 kN, speed 0.05 m/s; accuracy ±50 µm", RequiredLegs())
+    assert (metric.push_n, metric.speed_mm_s) == (3000.0, 50.0)
+    assert metric.error_mm == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("row", "reason"),
+    [
+        ("LA-20, blue", "no value"),
+        ("stroke 150", "no value"),
+        ("push 300 lbf", "in N, kN; got 300 lbf"),
+        ("push 1,500 N", "got 1,500"),
+        ("stroke 150 retracted 0", "retracted"),
+    ],
+)
+def test_row_of_a_data_sheet_that_cannot_be_read_is_refused(row: str, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        legs_from_row(row, RequiredLegs())
+
+
+def test_limits_of_lengths_beyond_the_need_change_no_worst_value() -> None:
+    design = PRESETS["buildable"]
+    lengths = dict.fromkeys(LENGTHS, (0.1, 1000.0))
+    limits = msgspec.structs.replace(design.limits, **lengths)
+    legs = msgspec.structs.replace(NEED.legs, ratio=1.74)
+    need = msgspec.structs.replace(NEED, legs=legs)
+    wide = check_requirement(msgspec.structs.replace(design, limits=limits), need)
+    own = check_requirement(design, need)
+    assert [each.name for each in own.missed] == [each.name for each in wide.missed] == ["ratio"]
+    length, *worst = [each.worst for each in own.demands]
+    assert [each.worst for each in wide.demands][1:] == pytest.approx(worst, rel=1e-4)
+    assert length < own.demands[0].limit == 446.0
+
+
+def test_demands_that_lack_what_they_need_are_refused_and_a_pull_alone_is_a_limit() -> None:
+    design = PRESETS["buildable"]
+    pull = msgspec.structs.replace(NEED.legs, push_n=None, pull_n=1.0)
+    check = check_requirement(design, msgspec.structs.replace(NEED, legs=pull))
+    assert [each.name for each in check.missed] == ["force"]
+    for field, value in (("tool", RequiredMotion(1000.0)), ("move_s", 1.0)):
+        with pytest.raises(InputError, match=r"needs? legs\.speed_mm_s"):
+            check_requirement(design, msgspec.structs.replace(NEED, **{field: value}))

@@ -17,7 +17,7 @@ from explorer.cli.streams import Meter
 from explorer.errors import NoAnswerError
 from explorer.files.writing import check_writable, make_folder
 from explorer.find.answers import DemandCheck, FoundDesign, FoundDesigns, RequirementCheck
-from explorer.find.bound import rounded_down
+from explorer.find.bound import round_down
 from explorer.find.check import check_requirement
 from explorer.find.nearest import find_or_relax
 from explorer.find.requirement import PREFERENCES, Requirement, load_requirement
@@ -129,11 +129,16 @@ def progress_line(found: FoundDesigns, *, is_over: bool) -> str:
     """Return the line beside the progress bar, before or after the time of the search is over."""
     if found.designs:
         longest = format_ascii(found.designs[0].longest_mm, 4)
-        return f"{len(found.designs)} designs, longest leg {longest} mm"
+        return f"{_counted(found)}, longest leg {longest} mm"
     if found.impossible or is_over:
         why = "; ".join(found.impossible) or "no design found"
         return f"{why}: looking for what is within reach"
     return "no design yet"
+
+
+def _counted(found: FoundDesigns) -> str:
+    count = len(found.designs)
+    return f"{count} design{'s' * (count != 1)}"
 
 
 def demand_json(design: Design, demand: DemandCheck) -> dict[str, object]:
@@ -214,7 +219,7 @@ def found_lines(
     requirement: Requirement, files: Sequence[Path | None], found: FoundDesigns
 ) -> Iterator[str]:
     """Yield the designs as a table, the bound, what binds, and the nearest values."""
-    yield f"{requirement.name}: {len(found.designs)} designs"
+    yield f"{requirement.name}: {_counted(found)}"
     if found.designs:
         rows: list[tuple[str, ...]] = [
             ("", "longest leg", "force for 1 N", "clearance", "transmission", "error", "")
@@ -225,7 +230,7 @@ def found_lines(
             rows.append((str(file or one.kind), *map(_figure, (*numbers, one.error_mm)), proof))
         yield output.table(rows, "<>>>>><")
     if 0.0 < found.bound_mm < math.inf:
-        yield f"no machine has legs below {rounded_down(found.bound_mm)} mm"
+        yield f"no machine has legs below {round_down(found.bound_mm)} mm"
     if found.binding:
         yield f"binding: {', '.join(found.binding)}"
     yield from (f"within reach: {each.words}" for each in found.nearest)

@@ -14,6 +14,7 @@ from explorer.app.widgets.buttons import open_button, press_button
 from explorer.export.drawings.markup import element, line, page_picture
 from explorer.export.drawings.mechanism import fit_view, mechanism, points_to_show
 from explorer.find.answers import DemandCheck, FoundDesign, FoundDesigns, RequirementCheck
+from explorer.find.bound import round_down
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
 from explorer.numerics.number_text import format_number
@@ -49,10 +50,10 @@ def result(found: FoundDesigns | None, *, is_searching: bool) -> Iterator[str]:
     if found.impossible:
         yield markup.alert("No machine can do this", _sentences(*found.impossible))
     elif not found.designs and not is_searching:
-        hardest = f"hardest to keep: {', '.join(found.binding)}" if found.binding else ""
-        yield markup.alert("No machine was found", _sentences(hardest or "relax a demand"))
+        yield markup.alert("No machine was found", _sentences("relax a demand"))
     elif found.bound_mm > 0.0:
-        yield f'<div class="ex-dim">No machine has legs below {found.bound_mm:.0f} mm.</div>'
+        least = round_down(found.bound_mm)
+        yield f'<div class="ex-dim">No machine has legs below {least} mm.</div>'
     hint = "Demand this instead, and search again."
     chips = "".join(
         press_button(RELAX, index, escape(each.words), hint=hint, class_name="ex-chip")
@@ -113,7 +114,7 @@ def _demand_row(demand: DemandCheck) -> str:
     )
     signs = "≥≤" if demand.kept else "><"
     sign = signs[demand.worst <= demand.limit]
-    values = f"{worst} {sign} {limit}{unit}" if demand.worst else ""
+    values = f"{worst} {sign} {limit}{unit}" if demand.limit or demand.worst else ""
     missed = f"by {short}{unit}" if demand.spare else "no"
     level, mark = ("within", "✓") if demand.kept else ("beyond", missed)
     name = escape(f"{demand.words[:1].upper()}{demand.words[1:]}")
