@@ -23,7 +23,7 @@ class DemandCheck(NamedTuple):
         unit: "mm", "°", "N", "s" or "" for a number.
         pose: The pose with the worst value; None where the demand is on the design as a whole.
         proven: Whether no pose of the box at any of the tilts misses it.
-        remark: Clause on what was checked, such as "no violation in 40000 poses", or "".
+        remark: Clause on what was checked, such as "no violation in 20000 poses", or "".
     """
 
     name: str
@@ -49,7 +49,7 @@ class RequirementCheck:
 
     Attributes:
         demands: The demands in a fixed order.
-        poses: Number of poses at which demands that are not proven were computed.
+        poses: Number of random poses for the demands that are not proven; 0 if all are.
     """
 
     demands: tuple[DemandCheck, ...]
@@ -86,6 +86,9 @@ class FoundDesign:
         clearance_mm: Least distance between the surfaces of two legs, in millimetres.
         transmission: Least transmission index.
         error_mm: Largest displacement of the tool by the actuators' errors, in millimetres.
+
+    Forces, clearance, transmission and error are the worst over the poses that were looked at, to
+    compare machines by; the check tells what is demanded of them.
     """
 
     design: Design
@@ -100,7 +103,7 @@ class FoundDesign:
 
 
 class Relaxation(NamedTuple):
-    """A demand with the value nearest to the required one that a design keeps, all others kept.
+    """A demand with a value within reach: a new search kept it, with all other demands.
 
     Attributes:
         demand: Field of the requirement, such as "tilt_deg", "box_mm" or "legs.longest_mm".
@@ -123,10 +126,10 @@ class FoundDesigns:
 
     Attributes:
         designs: The designs found, the preferred one first; none if none was found.
-        bound_mm: Length that the longest leg has at least in every machine that keeps the
-            requirement; 0 if nothing is known.
+        bound_mm: Length below which no machine has its longest leg; 0 if nothing is known, and
+            infinite if no machine keeps the requirement.
         impossible: Clauses on demands that no machine keeps, proven; () if there are none.
-        binding: Names of the demands that bound the best design, or that were missed.
+        binding: Names of the demands that bind the best design; () without one.
         nearest: The nearest values, as far as `nearest_values` was asked for them.
         status: "found", "none" (searched in vain), "impossible" or "cancelled".
     """

@@ -26,7 +26,7 @@ from explorer.find.requirement import Requirement
 from explorer.find.terms import Terms
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.numerics.arrays import BoolArray, FloatArray, dot, lengths_of
-from explorer.prototype.sizes import THINNEST_LEG, LegSizes
+from explorer.prototype.sizes import THINNEST_LEG
 
 # Share of the swing beyond the tilt by which a tilt may turn less about the nearest axis that is
 # looked at, and the fewest and the most of half of these axes.
@@ -79,11 +79,7 @@ class _Leg4:
         self.terms, self.half = terms, 0.5 * terms.edges
         self.corners = self.half * CORNERS
         self.height = float(self.half[2]) + terms.margin
-        self.dead = -math.inf
-        if terms.requirement.buildable:
-            radius = max(0.5 * terms.requirement.legs.diameter_mm, THINNEST_LEG)
-            joint = LegSizes(radius, 0.0)
-            self.dead = LegSizes(radius, joint.bottom + joint.plate).dead / terms.scale_mm
+        self.dead = -math.inf if terms.parts is None else float(terms.parts.dead[3])
         self.tilt = 0.0 if "tool" in terms.requirement.free else terms.tilt
         self.angles = np.zeros(0)
         if self.tilt and terms.swing < math.pi:

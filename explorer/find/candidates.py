@@ -74,16 +74,19 @@ def candidates(terms: Terms, seed: int) -> Iterator[tuple[FloatArray, FloatArray
         x = np.ones((BLOCK, len(m.VARIABLES)))
         x[:, m.TX : m.TILT] = 0.0
         x[:, :count] = LOWS[:count] + (HIGHS - LOWS)[:count] * shares
+        sizes = terms.spread ** random.random((BLOCK, 1))
+        x[:, : m.BOX_YAW] *= sizes
+        x[:, m.TX : m.TILT] *= sizes
         is_level = np.arange(BLOCK) % 2 == 0
         if "orientation" not in terms.requirement.free:
             is_level[:] = True
         x[is_level, m.PITCH : m.TX] = 0.0
-        found = [_looked_at(part, terms, looks) for part in np.split(x, PARTS)]
+        found = [_look(part, terms, looks) for part in np.split(x, PARTS)]
         x, missed, large = map(np.concatenate, zip(*found, strict=True))
         yield x, missed, large
 
 
-def _looked_at(
+def _look(
     x: FloatArray, terms: Terms, looks: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the machines that are not dropped after any look at poses, with `misses`."""

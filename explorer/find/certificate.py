@@ -14,7 +14,7 @@ import numpy as np
 from explorer.find import machine_values as m
 from explorer.find.candidates import standard_poses
 from explorer.find.demands import Demand, demands_of, limits_of
-from explorer.find.over_poses import look_at, prove_demand, sample_demand, search_near
+from explorer.find.over_poses import look_at, prove_demand, sample_demand
 from explorer.find.over_tilts import prove_limits
 from explorer.find.terms import Terms
 from explorer.mechanism.design import LENGTHS
@@ -23,12 +23,14 @@ from explorer.numerics.cells import CellValues
 
 # Share by which the limits of lengths exceed the lengths that were found.
 PADDING = 1e-5
-# Amount up to which a demand is kept, over the diagonal or over its limit.
+# Miss below which a search takes a demand as kept, over the diagonal or over its limit.
 TOLERANCE = 1e-9
-# What is left where a demand is nearly missed.
+# Amount to spare below which a pose joins the search.
 NEARLY = 0.03
 # Random poses in which demands are computed that are not proven.
 SAMPLES = 20_000
+# Random poses among which the worst values are sought that are told.
+CLOSELY = 5000
 # Rounds in which the ranges of the lengths grow until nothing exceeds them.
 ROUNDS = 6
 
@@ -133,12 +135,12 @@ def certify(
             else:
                 part = part.merged(prove_demand(demand, x, terms, cells))
                 if part.values.max() <= TOLERANCE < part.bounds.max():
-                    part = part.merged(sample_demand(demand, x, terms, SAMPLES))
+                    part = part.merged(sample_demand(demand, x, terms, SAMPLES, poses))
             parts.append(part)
         if cells is None:
             known = np.concatenate([part.places for part in parts])
             for index, demand in enumerate((*limits, *demands), 1):
-                closer = search_near(demand, x, terms, known)
+                closer = sample_demand(demand, x, terms, CLOSELY, known)
                 parts[index] = parts[index].merged(closer)
         found = CellValues(*map(np.concatenate, zip(*parts, strict=True)))
     lengths = [(LENGTH, f"{end} {leg}") for end in ("longest", "shortest") for leg in LENGTHS]
@@ -155,6 +157,6 @@ def _parts(found: CellValues, limits: Sequence[Demand]) -> list[CellValues]:
 
 
 def is_regular(x: FloatArray) -> bool:
-    """Whether a machine is finite and not degenerate."""
+    """Return whether a machine is finite and not degenerate."""
     sizes = np.abs([x[m.A3Y], x[m.B1Y], x[m.B3] - x[m.B2]])
     return bool(np.isfinite(x).all() and sizes.min() > 1e-6)

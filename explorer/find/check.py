@@ -16,6 +16,7 @@ from explorer.find import machine_values as m
 from explorer.find.answers import DemandCheck, RequirementCheck
 from explorer.find.candidates import standard_poses
 from explorer.find.certificate import (
+    CLOSELY,
     LENGTH,
     SAMPLES,
     Certificate,
@@ -24,6 +25,7 @@ from explorer.find.certificate import (
     used_ranges,
 )
 from explorer.find.demands import Demand, demands_of, limits_of
+from explorer.find.over_poses import sample_demand
 from explorer.find.over_tilts import CORNERS, poses_over
 from explorer.find.requirement import Requirement
 from explorer.find.terms import Terms, row_of
@@ -37,7 +39,7 @@ from explorer.prototype.fitting import buildability
 
 # Tolerance of lengths over the diagonal of the box, with which found designs keep their own limits.
 CLOSE = 1e-7
-# Amount up to which a demand is kept, over the diagonal or over its limit.
+# Miss below which a check tells a demand as kept, over the diagonal or over its limit.
 KEPT = 1e-6
 
 
@@ -125,7 +127,7 @@ class _Check:
         *,
         is_least: bool = False,
     ) -> DemandCheck:
-        """Return the check of the worst of the lengths or their ratios, which is that in a row."""
+        """Return the check of the length or ratio in a row, which is the worst."""
         worst, limit = float(values[row]), float(limit)
         spare = worst - limit if is_least else limit - worst
         item = self.found.items[row] if name == LENGTH else LENGTHS[row]
@@ -145,8 +147,9 @@ class _Check:
                 missed[:] = demand.limit
         told = demand.told(missed)
         if demand.tell is not None:
-            each = demand.tell(self.terms.values(self.x, poses))
-            told = np.diag(np.broadcast_arrays(*each))
+            shown = demand._replace(values=demand.tell, limit=demand.offset, factor=1.0, offset=0.0)
+            closer = sample_demand(shown, self.x, self.terms, CLOSELY, found.poses)
+            told, poses = shown.told(closer.values), closer.places
         worst = int((demand.side * told).argmax())
         limit, kept = float(demand.told(np.zeros(1))[0]), bool(missed.max() <= KEPT)
         remark = "" if proven or not kept else f"no violation in {SAMPLES} poses"

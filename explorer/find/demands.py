@@ -211,14 +211,7 @@ def _of_actuators(terms: Terms) -> Iterator[Demand]:
     if (most_error := need.error_mm) is not None:
 
         def error(at: MachineValues) -> list[Any]:
-            # The errors of all actuators have one size, so that signs alone tell the sums apart.
-            sums: list[Any] = []
-            for signs in SIGNS.tolist():
-                total, *others = at.velocities
-                for sign, velocity in zip(signs, others, strict=True):
-                    total = m.plus(total, m.times(sign, velocity))
-                sums.append(m.longest(total))
-            return [legs.error_mm / most_error * np.max(sums, axis=0)]
+            return [legs.error_mm / most_error * largest_error(at)]
 
         yield demand("error", ("",), error, most_error, "mm")
     if (most_bend := need.deflection_mm) is not None:
@@ -232,3 +225,14 @@ def _of_actuators(terms: Terms) -> Iterator[Demand]:
             return [compliance / most_bend * sum(bends)]
 
         yield demand("deflection", ("",), deflection, most_bend, "mm")
+
+
+def largest_error(at: MachineValues) -> Any:
+    """Return the largest displacement of the tool for errors of a unit of all actuators."""
+    sums: list[Any] = []
+    for signs in SIGNS.tolist():
+        total, *others = at.velocities
+        for sign, velocity in zip(signs, others, strict=True):
+            total = m.plus(total, m.times(sign, velocity))
+        sums.append(m.longest(total))
+    return np.max(sums, axis=0)

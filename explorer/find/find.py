@@ -1,8 +1,8 @@
 """The search for machines that keep a requirement.
 
-Of many random machines the best few are improved by SQP, with their certificate as the oracle: the
+Of many random machines the best few are improved by SQP, while their certificate decides: the
 poses that miss a demand join the search, until none is found. Later starts are others of the
-random machines, and the best machines so far, shaken. How much is done in a second is fixed, so
+random machines, and machines near the best so far. How much is done in a second is fixed, so
 that a search with the same seed finds the same machines.
 """
 
@@ -22,7 +22,7 @@ from explorer.find.bound import impossible_demands, least_longest_mm
 from explorer.find.candidates import candidates, standard_poses
 from explorer.find.certificate import Certificate, certify, is_regular, lengths_over
 from explorer.find.check import check_machine
-from explorer.find.demands import demands_of, limits_of
+from explorer.find.demands import demands_of, largest_error, limits_of
 from explorer.find.improvement import Improvement, free_variables
 from explorer.find.over_tilts import nearest_poses
 from explorer.find.requirement import PREFERENCES, Preference, Requirement
@@ -50,8 +50,8 @@ NEARLY = 1e-3
 TRIED, IMPROVED = 8, 6
 # Share of the distance of legs beyond which a clearance that is missed is that of crossed legs.
 CROSSED = 0.7
-# Sizes of the shakes of the best machines, over their variables' ranges.
-SHAKES = (0.02, 0.06, 0.15)
+# Sizes of the changes of the best machines, over their variables' ranges.
+CHANGES = (0.02, 0.06, 0.15)
 
 OTHER_KINDS: tuple[Preference, ...] = (
     *("balanced", "small", "far-from-singular", "easy-to-build"),
@@ -81,8 +81,11 @@ class Search:
         units: Units of work that it may take.
         ends: Time of the clock at which it ends at the latest.
         stop: Function that says whether to end.
+        seed: Seed of the random machines.
         enough: Longest leg over the diagonal of the box that ends the search.
         best: The best machine of each kind.
+        done: Units of work that it has taken.
+        is_cancelled: Whether `stop` has ended it.
     """
 
     terms: Terms
@@ -145,7 +148,7 @@ class Search:
                 yield start, kind
             for kind in itertools.cycle(self.kinds):
                 best = self.best.get(kind)
-                yield self._shake(start if best is None else best.x, random), kind
+                yield self._near(start if best is None else best.x, random), kind
         first = True
         for x, missed, large in candidates(self.terms, self.seed):
             self.spend(BLOCK_UNITS)
@@ -172,10 +175,10 @@ class Search:
                 if self.best:
                     others = [*self.best.values()]
                     best = self.best.get(kind) or others[random.integers(len(others))]
-                    yield best.x if kind not in self.best else self._shake(best.x, random), kind
+                    yield best.x if kind not in self.best else self._near(best.x, random), kind
             if self.kinds[0] in self.best:
-                for _ in SHAKES:
-                    yield self._shake(self.best[self.kinds[0]].x, random), self.kinds[0]
+                for _ in CHANGES:
+                    yield self._near(self.best[self.kinds[0]].x, random), self.kinds[0]
 
     def _as_it_is(self, x: FloatArray) -> Machine | None:
         """Return a machine with its certificate, of the preferred kind; None if it fails."""
@@ -187,10 +190,10 @@ class Search:
         cost = Improvement(self.terms, kind, x).cost(poses)
         return Machine(x, certificate, cost, kind, poses)
 
-    def _shake(self, x: FloatArray, random: np.random.Generator) -> FloatArray:
+    def _near(self, x: FloatArray, random: np.random.Generator) -> FloatArray:
         """Return a machine near another one."""
         free, moved = free_variables(self.terms), x.copy()
-        moved[free] += random.choice(SHAKES) * random.normal(size=len(free))
+        moved[free] += random.choice(CHANGES) * random.normal(size=len(free))
         return moved
 
     def improve(self, x: FloatArray, kind: str) -> Machine | None:
@@ -340,9 +343,9 @@ def _answer(found: Machine, terms: Terms, base: Design | None) -> FoundDesign:
         longest_mm=float(terms.scale_mm * certificate.ranges[:, 1].max()),
         utilisation=float(max((np.max(each) for each in used), default=0.0)),
         force_per_newton=float(speeds.max()),
-        clearance_mm=float(terms.scale_mm * np.min(at.distances)) - legs.diameter_mm,
+        clearance_mm=float(terms.scale_mm * np.min(at.uncrossed_distances)) - legs.diameter_mm,
         transmission=float(np.min(at.transmissions)),
-        error_mm=float(legs.error_mm * speeds.sum(axis=0).max()),
+        error_mm=float(legs.error_mm * np.max(largest_error(at))),
     )
 
 

@@ -325,7 +325,8 @@ def _ignore(_: FloatArray, __: FloatArray) -> None:
 
 def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return lows and highs of the variables and of the bounds of an improvement."""
-    lows, highs = np.full(len(m.VARIABLES), -FARTHEST), np.full(len(m.VARIABLES), FARTHEST)
+    farthest = FARTHEST * search.terms.spread
+    lows, highs = np.full(len(m.VARIABLES), -farthest), np.full(len(m.VARIABLES), farthest)
     for index in (m.A3Y, m.B1Y):
         (lows if x[index] > 0.0 else highs)[index] = math.copysign(LEAST, x[index])
     for index in (m.BOX_YAW, m.YAW, m.PITCH, m.ROLL):
@@ -336,5 +337,5 @@ def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]
     count = len(search.extra)
     # A demand that is kept is lowered no further.
     least = [0.02] * 4 + [0.1] + [0.0 if each == MISS else -30.0 for each in search.extra]
-    most = [FARTHEST] * 5 + [30.0] * count
+    most = [farthest] * 5 + [30.0] * count
     return np.array([*lows[free], *least]), np.array([*highs[free], *most])

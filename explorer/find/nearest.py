@@ -76,7 +76,7 @@ def nearest_values(
     fields = [
         field
         for field in relaxable_fields(requirement)
-        if not impossible_demands(_left_out(requirement, field))
+        if not impossible_demands(_leave_out(requirement, field))
     ]
     ends, terms = time.perf_counter() + PATIENCE * seconds, Terms.of(requirement)
     for index, field in enumerate(fields):
@@ -100,9 +100,10 @@ def find_or_relax(
     seed: int = 0,
     design: Design | None = None,
 ) -> FoundDesigns:
-    """Search for designs as `find_designs` does, and for the nearest values if there are none.
+    """Search for designs as `find_designs` does, and for nearest values if there are none.
 
-    The refusal is watched at once, and then every nearest value as soon as it is found.
+    The latter takes three times as long. The refusal is watched at once, and then every nearest
+    value as soon as it is found.
     """
     found = find_designs(
         requirement, count=count, seconds=seconds, seed=seed, design=design, watch=watch, stop=stop
@@ -148,7 +149,7 @@ class _Nearest(Search):
     def _told(self, factor: float) -> Relaxation | None:
         """Return a value with as little room as a new search needs; None if it finds nothing."""
         for room in ROOMS:
-            asked = relaxed(self.terms.requirement, self.field, factor * room)
+            asked = relax(self.terms.requirement, self.field, factor * room)
             if asked is None:
                 return None
             if impossible_demands(asked):
@@ -175,19 +176,22 @@ class _Nearest(Search):
             return x
 
         yield from map(opened, known[::-1])
-        easy = _left_out(self.terms.requirement, self.field)
+        easy = _leave_out(self.terms.requirement, self.field)
         for x, missed, large in candidates(Terms.of(easy), self.seed):
             self.spend(BLOCK_UNITS)
             order = np.argsort(np.log(large) + 4.0 * np.maximum(missed, 0.0))[:STARTS]
             for row in x[order]:
-                yield opened(_scaled(row, size) if self.field == "box_mm" else row)
+                yield opened(_scale(row, size) if self.field == "box_mm" else row)
 
     def certify(self, x: FloatArray, poses: FloatArray) -> tuple[Certificate, bool]:
-        """Return the same for the value that a machine asks for, and a little more."""
+        """Return the certificate of a machine against the value that it asks for with some room.
+
+        Whether it keeps all demands comes second.
+        """
         self.factor = self._factor(x, poses)
-        asked = relaxed(self.terms.requirement, self.field, max(1.0, self.factor) * CLOSE)
+        asked = relax(self.terms.requirement, self.field, max(1.0, self.factor) * CLOSE)
         scales = np.array([1.0, 1.0, 1.0, 1.0, x[m.TILT]])
-        moved = _scaled(x, 1.0 / x[m.SIZE])
+        moved = _scale(x, 1.0 / x[m.SIZE])
         moved[m.TILT] = moved[m.SIZE] = 1.0
         own = self.terms if asked is None else Terms.of(asked)
         found = certify(moved, own, cells=CELLS, poses=poses * scales, is_quick=True)
@@ -212,7 +216,7 @@ class _Nearest(Search):
         return (own / value if value > 0.0 else math.inf) if demand.is_least else value / own
 
 
-def _scaled(x: FloatArray, factor: float) -> FloatArray:
+def _scale(x: FloatArray, factor: float) -> FloatArray:
     """Return a machine with its lengths times a factor."""
     x = x.copy()
     x[: m.BOX_YAW] *= factor
@@ -220,10 +224,10 @@ def _scaled(x: FloatArray, factor: float) -> FloatArray:
     return x
 
 
-def _left_out(requirement: Requirement, field: str) -> Requirement:
+def _leave_out(requirement: Requirement, field: str) -> Requirement:
     """Return a requirement without one demand, or with a small tilt or box."""
     if field in SMALL:
-        return relaxed(requirement, field, 1.0 / SMALL[field]) or requirement
+        return relax(requirement, field, 1.0 / SMALL[field]) or requirement
     head, _, tail = field.partition(".")
     if tail:
         changed = {tail: 0.0 if tail == "apart_mm" else None}
@@ -252,7 +256,7 @@ def relaxable_fields(requirement: Requirement) -> list[str]:
     return [field for field in fields if is_demanded(field)]
 
 
-def relaxed(requirement: Requirement, field: str, factor: float) -> Requirement | None:
+def relax(requirement: Requirement, field: str, factor: float) -> Requirement | None:
     """Return a requirement with one demand relaxed by a factor above 1; None if it cannot be.
 
     Values are those that a user would type, of three digits.

@@ -65,22 +65,19 @@ def look_at(demand: Demand, at: MachineValues) -> CellValues:
     return CellValues(worst, at.poses[missed.argmax(axis=0)], worst.copy())
 
 
-def sample_demand(demand: Demand, x: FloatArray, terms: Terms, count: int) -> CellValues:
-    """Return by how much a demand is missed at most in random poses, and near the worst of them.
+def sample_demand(
+    demand: Demand, x: FloatArray, terms: Terms, count: int, known: FloatArray
+) -> CellValues:
+    """Return by how much a demand is missed at most in known and random poses, and near the worst.
 
-    The bounds are the values. Half of the poses are on faces of the box, at the largest tilt.
+    The bounds are the values. Half of the random poses are on faces of the box, at the largest
+    tilt.
     """
     random, (lows, highs) = np.random.default_rng(0), ends_of(terms)
     poses = random.uniform(lows, highs, (count, 5))
     poses[::2, :3] = np.clip(2.0 * poses[::2, :3], -1.0, 1.0)
     poses[::2, 4] = terms.tilt
-    return search_near(demand, x, terms, poses)
-
-
-def search_near(demand: Demand, x: FloatArray, terms: Terms, poses: FloatArray) -> CellValues:
-    """Return by how much a demand is missed at most in poses, and in random ones near the worst."""
-    random, (lows, highs) = np.random.default_rng(0), ends_of(terms)
-    found = look_at(demand, terms.values(x, poses))
+    found = look_at(demand, terms.values(x, np.concatenate([known, poses])))
     for width in NARROWER:
         centres = np.repeat(found.places, NEAR, axis=0)
         near = centres + width * (highs - lows) * random.normal(size=centres.shape)

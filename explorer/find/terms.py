@@ -72,7 +72,7 @@ ROOM = 0.01
 
 
 def part_slacks(parts: Parts, home: MachineValues) -> list[FloatArray]:
-    """Return what the distances of the parts of machines at home exceed those that they need."""
+    """Return the slacks of the distances that the parts need, for machines at home."""
     x, keeps = home.x, 1.0 + ROOM
     d1, d3 = (end[0] for end in home.ends[1:3])
     rows = [m.size(d3 - d1) - keeps * parts.carriages]
@@ -99,6 +99,7 @@ class Terms:
         margin: Least margin.
         swing: Half-angle of the cones; π without one.
         distance: Least distance of the axes of two legs; 0 for none.
+        spread: Factor on the usual sizes of machines, above 1 for thick legs and short strokes.
         parts: Sizes of the parts where they must fit; None otherwise.
     """
 
@@ -111,6 +112,7 @@ class Terms:
     margin: float
     swing: float
     distance: float
+    spread: float
     parts: Parts | None
 
     @staticmethod
@@ -129,16 +131,20 @@ class Terms:
         def most(value: float | None, unit: float = 1.0) -> float:
             return math.inf if value is None else value / unit
 
+        distance, ratio = (legs.diameter_mm + legs.apart_mm) / scale, most(legs.ratio)
+        # No leg is shorter than the least edge allows with a ratio of its lengths.
+        least = 0.0 if legs.ratio is None else min(requirement.box_mm) / scale / (1.0 - 1.0 / ratio)
         return Terms(
             requirement=requirement,
             scale_mm=scale,
             edges=np.array(requirement.box_mm) / scale,
             tilt=math.radians(requirement.tilt_deg),
-            ratio=most(legs.ratio),
+            ratio=ratio,
             longest=most(legs.longest_mm, scale),
             margin=requirement.least_margin_mm / scale,
             swing=math.radians(requirement.swing_deg or 180.0),
-            distance=(legs.diameter_mm + legs.apart_mm) / scale,
+            distance=distance,
+            spread=max(1.0, 0.5 * least, 6.0 * distance),
             parts=Parts.of(legs.diameter_mm, scale) if requirement.buildable else None,
         )
 

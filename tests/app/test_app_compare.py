@@ -63,7 +63,7 @@ from explorer.statics.loaded import LoadedPose
 from explorer.workspace.slices.volume import node_count_of, workspace_volume
 from explorer.workspace.workspace import Workspace
 
-INITIAL, OPTIMAL = PRESETS.values()
+INITIAL, OPTIMAL = PRESETS["paper-initial"], PRESETS["paper-optimal"]
 LISTED = measures_in("compare")
 
 
@@ -412,7 +412,10 @@ def content_of(panel: ComparePanel, state: State) -> str:
 def test_design_is_pinned_by_one_press(services: Services, desk: Desk) -> None:
     panel = ComparePanel(services)
     words = content_of(panel, desk.state)
-    assert re.findall('data-press="compare.pin" data-value="([^"]*)"', words) == ["paper-initial"]
+    assert re.findall('data-press="compare.pin" data-value="([^"]*)"', words) == [
+        "buildable",
+        "paper-initial",
+    ]
     for name in ("paper-initial", "nothing of this name"):
         desk.press(services.buttons, "compare.pin", name)
         assert Compared.of(desk.state).pinned == (INITIAL, None, None)

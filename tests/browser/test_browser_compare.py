@@ -17,7 +17,7 @@ def test_button_in_markup_that_is_pressed_by_a_key_keeps_the_focus(tab: Tab) -> 
     bars.wait_for()
     tab.settle()
     tab.page.get_by_role("button", name="Pin this design").focus()
-    for _ in range(2):
+    for _ in range(3):
         tab.page.keyboard.press("Tab")
     expect(bars).to_be_focused()
     tab.page.keyboard.press("Enter")

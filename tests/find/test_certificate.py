@@ -172,7 +172,7 @@ def test_demands_sampled_find_the_worst_of_many_poses() -> None:
     x = random_machine(random, tool=True)
     at = terms.values(x, random_poses(random, terms, 20_000))
     for demand in demands_of(terms):
-        found = sample_demand(demand, x, terms, 2000)
+        found = sample_demand(demand, x, terms, 2000, HOME)
         worst = demand.missed_rows(at).max(axis=0)
         assert (found.values >= worst - 0.01 * np.abs(worst) - 1e-3).all()
 
