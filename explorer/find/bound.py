@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,7 @@ HALVINGS = 24
 FARTHEST = 1e6
 
 
+@lru_cache(maxsize=4)
 def least_longest_mm(requirement: Requirement) -> float:
     """Return a length that the longest leg of every machine has at least, in millimetres.
 

@@ -16,7 +16,7 @@ from explorer.find.demands import clearances_of, limits_of, sizes_of
 from explorer.find.machine_values import HOME, MachineValues
 from explorer.find.over_tilts import CORNERS, poses_over
 from explorer.find.terms import Terms, part_slacks
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, IntArray
 
 # Ranges of the variables, over the diagonal of the box or in radians.
 LOWS = np.array(
@@ -61,6 +61,11 @@ def misses(terms: Terms, at: MachineValues) -> tuple[FloatArray, FloatArray]:
         found.append(-np.min(np.broadcast_arrays(*tight), axis=0) / (0.2 * large))
         found.append(((longest + terms.parts.dead) / (2.0 * shortest)).max(axis=1) - 1.0)
     return np.max(found, axis=0), large
+
+
+def best_first(missed: FloatArray, large: FloatArray) -> IntArray:
+    """Return the order of machines by their longest legs and by what they miss, the best first."""
+    return np.argsort(np.log(large) + 4.0 * np.maximum(missed, 0.0))
 
 
 def candidates(terms: Terms, seed: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:

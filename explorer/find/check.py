@@ -24,11 +24,11 @@ from explorer.find.certificate import (
     lengths_over,
     used_ranges,
 )
-from explorer.find.demands import Demand, demands_of, limits_of
+from explorer.find.demands import Demand, every_demand
 from explorer.find.over_poses import sample_demand
 from explorer.find.over_tilts import CORNERS, poses_over
 from explorer.find.requirement import Requirement
-from explorer.find.terms import Terms, row_of
+from explorer.find.terms import Terms, design_of, row_of
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import LENGTHS, Design
@@ -72,6 +72,15 @@ def check_machine(
     return RequirementCheck(demands, SAMPLES if is_open else 0)
 
 
+def is_kept(x: FloatArray, terms: Terms, certificate: Certificate) -> bool:
+    """Return whether a machine keeps all demands, those on its size, moves and parts too."""
+    if not certificate.is_kept:
+        return False
+    design = design_of(x, terms, certificate.ranges, "machine")
+    whole = _Check(design, x, terms, certificate).on_the_whole()
+    return all(demand.kept for demand in whole)
+
+
 class _Check:
     """The demands of a requirement on one machine."""
 
@@ -80,10 +89,14 @@ class _Check:
 
     def demands(self) -> Iterator[DemandCheck]:
         """Yield the demands in the order of the file."""
-        requirement = self.terms.requirement
         yield from self._lengths()
-        for demand in (*limits_of(self.terms), *demands_of(self.terms)):
+        for demand in every_demand(self.terms):
             yield self._demand(demand)
+        yield from self.on_the_whole()
+
+    def on_the_whole(self) -> Iterator[DemandCheck]:
+        """Yield the demands on the machine as a whole, which a certificate does not have."""
+        requirement = self.terms.requirement
         if requirement.hull_mm is not None:
             yield self._hull(requirement.hull_mm)
         if requirement.move_s is not None:

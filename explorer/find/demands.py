@@ -137,6 +137,11 @@ def sizes_of(terms: Terms) -> Iterator[Demand]:
         yield Demand("outer size", tuple("xyz"), farthest, limit, "mm", 1.0, reserve=reserve)
 
 
+def every_demand(terms: Terms) -> list[Demand]:
+    """Return the demands on the values of a machine in every pose."""
+    return [*limits_of(terms), *demands_of(terms)]
+
+
 def clearances_of(terms: Terms) -> Iterator[Demand]:
     """Yield the demand on the distances of the legs, if there is one."""
 

@@ -19,10 +19,10 @@ import numpy as np
 
 from explorer.find.answers import FoundDesign, FoundDesigns
 from explorer.find.bound import impossible_demands, least_longest_mm
-from explorer.find.candidates import candidates, standard_poses
+from explorer.find.candidates import best_first, candidates, standard_poses
 from explorer.find.certificate import Certificate, certify, is_regular, lengths_over
-from explorer.find.check import check_machine
-from explorer.find.demands import demands_of, largest_error, limits_of
+from explorer.find.check import check_machine, is_kept
+from explorer.find.demands import demands_of, every_demand, largest_error
 from explorer.find.improvement import Improvement, free_variables
 from explorer.find.over_tilts import nearest_poses
 from explorer.find.requirement import PREFERENCES, Preference, Requirement
@@ -157,8 +157,7 @@ class Search:
                 kept = next((each for each in tried if each is not None), None)
                 if kept is not None:
                     yield kept
-            score = np.log(large) + 4.0 * np.maximum(missed, 0.0)
-            order = np.argsort(score)[: IMPROVED if first else IMPROVED // 2]
+            order = best_first(missed, large)[: IMPROVED if first else IMPROVED // 2]
             before = self.best.get(self.kinds[0])
             for row in order:
                 yield x[row], self.kinds[0]
@@ -314,14 +313,6 @@ def find_designs(
     return found if found.designs else replace(found, status=status)
 
 
-def is_kept(x: FloatArray, terms: Terms, certificate: Certificate) -> bool:
-    """Return whether a machine keeps all demands, those on its size, moves and parts too."""
-    if not certificate.is_kept:
-        return False
-    design = design_of(x, terms, certificate.ranges, "machine")
-    return check_machine(design, x, terms, certificate).kept
-
-
 def _never() -> bool:
     return False
 
@@ -358,7 +349,7 @@ def _binding(found: Machine, terms: Terms) -> tuple[str, ...]:
     """Return the names of the demands that bind a machine."""
     certificate = found.certificate
     ratios = certificate.ranges[:, 1] / certificate.ranges[:, 0]
-    reserve = {each.name: each.reserve for each in (*limits_of(terms), *demands_of(terms))}
+    reserve = {each.name: each.reserve for each in every_demand(terms)}
     rows = zip(certificate.names[8:], certificate.items[8:], certificate.missed[8:], strict=True)
     binding = [
         f"{name} {item}".strip() for name, item, each in rows if each > -BINDING - reserve[name]

@@ -20,9 +20,10 @@ from explorer.errors import ExplorerError
 from explorer.find import machine_values as m
 from explorer.find.answers import FoundDesigns, Relaxation
 from explorer.find.bound import impossible_demands
-from explorer.find.candidates import candidates
+from explorer.find.candidates import best_first, candidates
 from explorer.find.certificate import Certificate, certify, lengths_over
-from explorer.find.demands import demands_of, limits_of
+from explorer.find.check import is_kept
+from explorer.find.demands import every_demand
 from explorer.find.find import (
     BLOCK_UNITS,
     CELLS,
@@ -30,7 +31,6 @@ from explorer.find.find import (
     UNITS_PER_SECOND,
     Search,
     find_designs,
-    is_kept,
 )
 from explorer.find.improvement import GROWING, RELAXED
 from explorer.find.requirement import Requirement
@@ -144,9 +144,9 @@ class _Nearest(Search):
             return None
         factor, x = min(found, key=lambda each: each[0])
         known.append(x)
-        return self._told(factor)
+        return self._relaxation(factor)
 
-    def _told(self, factor: float) -> Relaxation | None:
+    def _relaxation(self, factor: float) -> Relaxation | None:
         """Return a value with as little room as a new search needs; None if it finds nothing."""
         for room in ROOMS:
             asked = relax(self.terms.requirement, self.field, factor * room)
@@ -168,20 +168,20 @@ class _Nearest(Search):
         """Yield machines that may miss the demand by far, without an end."""
         size = SMALL.get(self.field, 1.0)
 
-        def opened(x: FloatArray) -> FloatArray:
+        def reset(x: FloatArray) -> FloatArray:
             x = x.copy()
             x[m.TILT], x[m.SIZE] = 1.0, 1.0
             if self.field in GROWING:
                 x[GROWING[self.field]] = size
             return x
 
-        yield from map(opened, known[::-1])
+        yield from map(reset, known[::-1])
         easy = _leave_out(self.terms.requirement, self.field)
         for x, missed, large in candidates(Terms.of(easy), self.seed):
             self.spend(BLOCK_UNITS)
-            order = np.argsort(np.log(large) + 4.0 * np.maximum(missed, 0.0))[:STARTS]
+            order = best_first(missed, large)[:STARTS]
             for row in x[order]:
-                yield opened(_scale(row, size) if self.field == "box_mm" else row)
+                yield reset(_scale(row, size) if self.field == "box_mm" else row)
 
     def certify(self, x: FloatArray, poses: FloatArray) -> tuple[Certificate, bool]:
         """Return the certificate of a machine against the value that it asks for with some room.
@@ -207,8 +207,7 @@ class _Nearest(Search):
             shortest, longest = lengths_over(x, terms, poses).T
             used = longest / shortest if field == "legs.ratio" else terms.scale_mm * longest
             return float(used.max() / own)
-        every = [*limits_of(terms), *demands_of(terms)]
-        demand = next(each for each in every if each.name == RELAXED[field])
+        demand = next(each for each in every_demand(terms) if each.name == RELAXED[field])
         at = terms.values(x, poses)
         if demand.tell:
             return float(np.max(demand.tell(at)) / own)
@@ -251,7 +250,7 @@ def relaxable_fields(requirement: Requirement) -> list[str]:
         return bool(getattr(requirement.legs, tail) if tail else getattr(requirement, head))
 
     terms = Terms.of(requirement)
-    names = {each.name for each in (*limits_of(terms), *demands_of(terms))}
+    names = {each.name for each in every_demand(terms)}
     fields = (field for field in _WORDS if field not in RELAXED or RELAXED[field] in names)
     return [field for field in fields if is_demanded(field)]
 

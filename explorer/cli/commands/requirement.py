@@ -129,14 +129,14 @@ def progress_line(found: FoundDesigns, *, is_over: bool) -> str:
     """Return the line beside the progress bar, before or after the time of the search is over."""
     if found.designs:
         longest = format_ascii(found.designs[0].longest_mm, 4)
-        return f"{_counted(found)}, longest leg {longest} mm"
+        return f"{_number_of_designs(found)}, longest leg {longest} mm"
     if found.impossible or is_over:
         why = "; ".join(found.impossible) or "no design found"
         return f"{why}: looking for what is within reach"
     return "no design yet"
 
 
-def _counted(found: FoundDesigns) -> str:
+def _number_of_designs(found: FoundDesigns) -> str:
     count = len(found.designs)
     return f"{count} design{'s' * (count != 1)}"
 
@@ -219,7 +219,7 @@ def found_lines(
     requirement: Requirement, files: Sequence[Path | None], found: FoundDesigns
 ) -> Iterator[str]:
     """Yield the designs as a table, the bound, what binds, and the nearest values."""
-    yield f"{requirement.name}: {_counted(found)}"
+    yield f"{requirement.name}: {_number_of_designs(found)}"
     if found.designs:
         rows: list[tuple[str, ...]] = [
             ("", "longest leg", "force for 1 N", "clearance", "transmission", "error", "")
