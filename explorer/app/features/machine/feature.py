@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, replace
-from html import escape
 
 import msgspec
-import numpy as np
 import viser
 
 from explorer.app.features.feature import Feature, Services, Tab, show_html
@@ -22,19 +19,16 @@ from explorer.app.state.geometry import ClearMachine
 from explorer.app.state.moves import FULL_TURN
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.widgets.markup import box, note
-from explorer.mechanism.design import DOWN, Design
+from explorer.app.widgets.markup import note
+from explorer.mechanism.design import DOWN
 from explorer.mechanism.machine import (
-    Actuators,
     Payload,
     Struts,
     Tolerances,
-    Tool,
     inertia_problem,
 )
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import Unit, format_number
+from explorer.numerics.number_text import format_number
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import NO_OPTION
 
@@ -81,14 +75,13 @@ class SetToolAngle(Action):
 
 
 class MachinePanel:
-    """The controls for the machine around the mechanism, under a line that describes it."""
+    """The controls for the machine around the mechanism."""
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
         self._controls = controls = MachineControls(services)
         # Moments of inertia that are being typed, and the payload that cannot have them.
         self._typed: tuple[Payload, Triple] | None = None
-        self._summary = gui.add_html("")
         controls.button(
             "Ideal machine",
             "Take tool, payload, actuators, struts, guide, tolerances and radii of the legs away.",
@@ -141,7 +134,6 @@ class MachinePanel:
         """Yield the updates that make the panel show the frame."""
         state = frame.state
         design = state.design
-        yield self._summary, "content", box(_with_units(machine_words(design, state.unit)))
         weight = design.payload.weight_n
         words = note(f"Its weight is {format_number(weight)} N.") if weight > 0.0 else ""
         yield from show_html(self._weight, words)
@@ -273,13 +265,6 @@ class MachinePanel:
             self._controls.field(label, hint, f"{TILTS}.{index}", step=FINE)
 
 
-def _with_units(words: str) -> str:
-    """Return words as HTML in which no line ends between a number and its unit."""
-    return re.sub(
-        r"(?<=\d) (kg|N m|N|mm/s²?)(?!\w)", lambda u: u[0].replace(" ", "&nbsp;"), escape(words)
-    )
-
-
 DIRECTIONS: dict[str, Triple] = {
     "down, −z": DOWN,
     "up, +z": (0.0, 0.0, 1.0),
@@ -292,52 +277,6 @@ DIRECTIONS: dict[str, Triple] = {
 
 # Distance of two unit vectors up to which they are the same but for rounding.
 SAME_DIRECTION = 1e-12
-# Significant digits of the numbers in the line.
-DIGITS = 3
-
-
-def machine_words(design: Design, unit: Unit) -> str:
-    """Return a line on the machine of a design, such as "Tool 30 mm from b4; carries 2 kg"."""
-    payload, guide, moment = design.payload, design.guide, design.struts.largest_moment
-    carried = _all_of((payload.mass_kg, "", "kg"), (payload.force_n, "a force of ", "N"))
-    bears = _all_of((guide.force_n, "", "N"), (guide.moment_nm, "", "N m"))
-    limits = {
-        "actuators": _actuator_words(design.actuators),
-        "struts": f"struts up to {_text(moment)} N m" if math.isfinite(moment) else "",
-        "guide": f"guide up to {bears}" if bears else "",
-    }
-    parts = [_tool_words(design.tool, unit), f"carries {carried or 'nothing'}"]
-    if design.gravity != DOWN:
-        along = f"along ({', '.join(map(_text, design.gravity))})"
-        parts.append(f"gravity {direction_name(design.gravity) or along}")
-    free = [f"the {name}" for name, words in limits.items() if not words]
-    has = "has" if free == ["the guide"] else "have"
-    no_limit = f"{' and '.join(free)} {has} no limit" if free else ""
-    actuators = design.actuators
-    for six, name, unit_name in (
-        (actuators.continuous_n, "continuous forces", "N"),
-        (actuators.speed_mm_s, "speeds", "mm/s"),
-        (actuators.acceleration_mm_s2, "accelerations", "mm/s²"),
-    ):
-        limits[name] = f"{name} up to {_range(np.array(six))} {unit_name}" if six else ""
-    parts += [*limits.values(), "no force is limited" if len(free) == 3 else no_limit]
-    line = "; ".join(filter(None, parts))
-    return f"{line[:1].upper()}{line[1:]}."
-
-
-def _all_of(*values: tuple[float | None, str, str]) -> str:
-    """Return those of some values that are given, each with the words before it and its unit."""
-    return " and ".join(f"{before}{_text(value)} {unit}" for value, before, unit in values if value)
-
-
-def _tool_words(tool: Tool, unit: Unit) -> str:
-    w, *axis = tool.quaternion
-    distance = math.hypot(*tool.position)
-    turn = math.degrees(2.0 * math.atan2(math.hypot(*axis), abs(w)))
-    if distance == 0.0 and turn == 0.0:
-        return "no tool"
-    place = "at b4" if distance == 0.0 else f"{unit.text(distance, DIGITS)} from b4"
-    return f"tool {place}" + (f", turned by {_text(turn)}°" if turn else "")
 
 
 def direction_name(gravity: Triple) -> str | None:
@@ -345,25 +284,6 @@ def direction_name(gravity: Triple) -> str | None:
     distances = {name: math.dist(gravity, along) for name, along in DIRECTIONS.items()}
     nearest = min(distances, key=distances.__getitem__)
     return nearest if distances[nearest] <= SAME_DIRECTION else None
-
-
-def _actuator_words(actuators: Actuators) -> str:
-    push, pull = actuators.limits
-    if np.array_equal(push, pull):
-        return f"actuators up to {_range(push)} N" if np.isfinite(push).all() else ""
-    sides = {"push": push, "pull": pull}
-    words = [f"{side} up to {_range(most)} N" for side, most in sides.items() if most[0] < math.inf]
-    return f"actuators {' and '.join(words)}"
-
-
-def _text(value: float) -> str:
-    return format_number(value, DIGITS)
-
-
-def _range(values: FloatArray) -> str:
-    """Return the range of values, or the value if they are all the same."""
-    low, high = (_text(float(value)) for value in (values.min(), values.max()))
-    return low if low == high else f"{low}–{high}"
 
 
 def moment_words(struts: Struts) -> str:

@@ -15,7 +15,6 @@ from explorer.app.features.mechanism.folds import Leaves, add_fold_sliders
 from explorer.app.features.mechanism.incidences import Gaps, Tetrahedra
 from explorer.app.features.mechanism.marks import DragHandle, Labels
 from explorer.app.features.mechanism.modes import MODES, Ghosts, ModesPanel
-from explorer.app.features.mechanism.sketch import sketch
 from explorer.app.inputs import ranges
 from explorer.app.inputs.bindings import ControlBinding, item
 from explorer.app.inputs.controls import Controls
@@ -32,6 +31,7 @@ from explorer.app.widgets.chips import Chips, StateCommand, choose
 from explorer.app.widgets.markup import alert, box, note, remark
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.mechanism.design_file import PRESETS
+from explorer.page.look import read_file
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import NO_OPTION, Key, shift
 from explorer.workspace.limits.table import LIMITS, Limit, LimitSlider, Switch
@@ -226,7 +226,7 @@ class DesignPanel:
                 icon=viser.Icon.RESTORE,
             )
         with controls.folder("Design variables ({unit})"):
-            self._sketch = gui.add_html("")
+            gui.add_html(read_file("sketch.svg"))
             for index, name in enumerate(VARIABLES):
                 controls.slider(
                     name,
@@ -269,7 +269,6 @@ class DesignPanel:
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
-        yield self._sketch, "content", sketch(frame.state.design)
         yield from self._controls.updates(frame)
 
     def _add_limits(self, *, in_degrees: bool) -> None:
