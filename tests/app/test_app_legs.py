@@ -13,22 +13,15 @@ import msgspec
 import numpy as np
 import pytest
 import trimesh
-import viser
 from desk import Desk, by_name, number, random_states, rows_of as rows_below_head, thick, viewed
-from hypothesis import given, strategies as st
 from services import StubJobs, services_for
 
 from explorer.app.features.feature import FeedProtocol, Services
 from explorer.app.features.legs.feature import (
-    RADIUS_FEED,
-    ClearancePanel,
     ClearanceScene,
     SweptTetrahedra,
-    chart_columns,
     clearance_figure,
     move_table,
-    radius_words,
-    volume_at,
 )
 from explorer.app.features.mechanism.bodies import AXIS_RADIUS, Legs
 from explorer.app.features.workspace import work
@@ -58,8 +51,6 @@ from explorer.mechanism.rgb import OUTLINE, TUBE
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.nodes import InvalidStartError, check_start
-from explorer.workspace.accessible.radii import RadiusCurve
-from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import slacks
 from explorer.workspace.workspace import Workspace
 
@@ -83,10 +74,6 @@ def show(state: State, **changes: Any) -> State:
     values = {"solid": True, "region": "accessible", **changes}
     workspace = replace(state.view.workspace, **values)
     return Set("view", replace(state.view, workspace=workspace)).apply(state)
-
-
-def show_curve(state: State) -> State:
-    return Set("view", replace(state.view, radius_curve=True)).apply(state)
 
 
 def with_limits(state: State, **limits: Any) -> State:
@@ -248,23 +235,6 @@ def test_failure_of_an_older_request_is_no_problem() -> None:
     assert feed.is_current
 
 
-def test_curve_is_requested_once_for_all_radii() -> None:
-    feed, jobs = follow(open_state(OPTIMAL), RADIUS_FEED)
-    state = show_curve(open_state(OPTIMAL))
-    narrow = with_limits(state, margin=1.0)
-    for each, orders in (
-        (open_state(OPTIMAL), 0),
-        (state, 1),
-        (thick(state, 0.3), 1),
-        (SetPosition(0, 11.0).apply(state), 1),
-        (narrow, 2),
-        (open_state(OPTIMAL), 2),
-    ):
-        feed.follow(Frame(each))
-        assert len(jobs.orders) == orders
-    assert jobs.orders[-1].request.design.limits.margin == 1.0
-
-
 def summary(state: State) -> str:
     """Return all that the panel says of the drawing of a state."""
     frame, feed = Frame(state), follow(state, WORKSPACE_FEED)[0]
@@ -345,88 +315,6 @@ def test_file_that_cannot_be_written_is_refused_with_what_would_work(
     design = with_limits(THICK, **limits).design
     with pytest.raises(InputError, match=reason):
         work.export_mesh(work.Selection(design, LEVEL, "accessible"), 0.1, "workspace", file_format)
-
-
-# The curve of radii
-
-
-def curve_of(state: State) -> RadiusCurve:
-    drawing = follow(show_curve(state), RADIUS_FEED)[0].drawing
-    assert isinstance(drawing, RadiusCurve)
-    return drawing
-
-
-def words_of(state: State) -> str:
-    return radius_words(Frame(state), follow(show_curve(state), RADIUS_FEED)[0])
-
-
-@given(st.lists(st.floats(1.0, 1e3), min_size=2, max_size=30), st.none() | st.floats(0.0, 2.0))
-def test_chart_shows_any_curve_and_marks_on_it(values: list[float], radius: float | None) -> None:
-    whole = curve_of(open_state(OPTIMAL))
-    drawn = replace(
-        whole,
-        radii=np.append(np.linspace(0.0, 0.5, len(values)), 0.5),
-        volumes=np.array([*sorted(values, reverse=True), 0.0]),
-        # Two legs that come as near as 0.1 bear radii of 0.05.
-        least=whole.least._replace(clearance=np.full(len(PAIRS), 0.1)),
-    )
-    x, y, *columns = chart_columns(drawn, radius)
-    assert (np.diff(x) >= 0.0).all()
-    assert (np.diff(y) <= 1e-9).all()
-    assert y[-1] == 0.0
-    assert x[-1] > 0.5
-    at = np.searchsorted(x, drawn.radii)
-    np.testing.assert_allclose(y[at[:-1]], drawn.volumes[:-1])
-    marked = (radius, drawn.radius_at(0.99), drawn.harmless)
-    for column, expected in zip(columns, marked, strict=True):
-        points = np.nonzero(np.isfinite(column))[0]
-        assert x[points].tolist() == ([] if expected is None else [expected])
-        for point in points:
-            assert column[point] == pytest.approx(volume_at(drawn, x[point]))
-    assert volume_at(drawn, 0.6) == 0.0
-
-
-def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
-    expected, html = curve_of(open_state(OPTIMAL)), words_of(thick(open_state(OPTIMAL), RADIUS))
-    rows = rows_of(html)
-    assert [row[0] for row in rows] == ["present radius", "99 % accessible up to", "no loss up to"]
-    assert number(rows[0][1]) == OPTIMAL.unit_mm * RADIUS
-    share = 100.0 * volume_at(expected, RADIUS) / float(expected.volumes[0])
-    assert number(rows[0][2]) == pytest.approx(share, rel=5e-3)
-    assert number(rows[1][1]) == pytest.approx(OPTIMAL.unit_mm * expected.radius_at(0.99), rel=5e-3)
-    assert rows[2][1] == "0"
-    assert "touch within the limits, where z = 0: legs 1 and 4 at (0, 0, 0) mm" in html
-    least = least_clearances(Workspace(OPTIMAL))
-    for pair in (PAIRS.index((2, 4)), PAIRS.index((3, 4))):
-        x, y = (format_number(OPTIMAL.unit_mm * float(v), 3) for v in least.position[pair, :2])
-        assert f"legs {PAIRS[pair][0]} and {PAIRS[pair][1]} at ({x}, {y}, 0) mm" in html
-
-
-def test_chart_appears_once_its_curve_is_computed(services: Services, jobs: StubJobs) -> None:
-    panel, feed = ClearancePanel(services), services.get(RADIUS_FEED)
-    state = show_curve(open_state(OPTIMAL))
-
-    def chart(state: State) -> dict[str, Any]:
-        feed.follow(Frame(state))
-        updates = list(panel.updates(Frame(state)))
-        return {name: v for h, name, v in updates if isinstance(h, viser.GuiUplotHandle)}
-
-    assert chart(open_state(OPTIMAL)) == chart(state) == {"visible": False}
-    assert "Computing" in radius_words(Frame(state), feed)
-    answer(jobs)
-    drawn = chart(state)
-    assert drawn["visible"] is True
-    radii, *volumes = chart_columns(curve_of(state), 0.0)
-    # In mm and in cm³.
-    expected = OPTIMAL.unit_mm * radii, *volumes
-    for found, column in zip(drawn["data"], expected, strict=True):
-        np.testing.assert_allclose(found, column, rtol=1e-12)
-    # A new limit: the old curve, called out of date, until the new one is there.
-    narrow = with_limits(state, margin=1.0)
-    assert chart(narrow)["visible"] is True
-    assert "computing" in radius_words(Frame(narrow), feed)
-    answer(jobs)
-    assert "computing" not in radius_words(Frame(narrow), feed)
 
 
 END = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))

@@ -99,7 +99,6 @@ def test_numbers_of_computed_drawings_are_written_alike(running: Running) -> Non
         ("view.workspace.solid", True),
         ("view.workspace.region", "accessible"),
         ("view.workspace.cut", "y"),
-        ("view.radius_curve", True),
         ("view.drawn_as", "prototype"),
         ("compared.pinned", (*PRESETS.values(), None)[:3]),
     ):

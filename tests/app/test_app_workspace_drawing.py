@@ -219,10 +219,6 @@ def test_cancelled_drawing_ends_at_the_next_stage_and_keeps_nothing_of_it(last: 
     with pytest.raises(CancelledError):
         work.draw_workspace(request, watched.line)
     assert len(watched.stages) == last
-    curve = Watched(last)
-    with pytest.raises(CancelledError):
-        work.draw_radius_curve(work.Selection(THICK, HOME_ROWS), curve.line)
-    assert len(curve.stages) == last
 
 
 def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:

@@ -202,7 +202,6 @@ class View:
         tetrahedra: Whether each of the three is drawn, and the gap that is left to its incidence.
         leaves: Whether the two inner leaves are drawn, with the folds beside them.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
-        radius_curve: Whether the accessible volume is drawn against the radius of the legs.
         ghosts: Whether the seven other assembly modes are drawn.
         warn_below: The length below which margins are warned of, in design units; distances
             are warned of below a share of it, see `explorer.measures.verdict`. None for a share of
@@ -227,7 +226,6 @@ class View:
     clearance: bool = False
     machine: bool = True
     swept: bool = False
-    radius_curve: bool = False
     ghosts: bool = False
     warn_below: float | None = field(default=None, metadata=LENGTHS)
     prototype: PrototypeView = field(default_factory=PrototypeView)

@@ -14,10 +14,8 @@ import numpy as np
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import move_clearances
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.computed_once import computed_once
-from explorer.numerics.search import Stages, Watch, ignore_stage
 from explorer.workspace.accessible.nodes import Survey, check_start, make_cell_grid, survey
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.slices.volume import volume_of
@@ -28,8 +26,6 @@ DEFAULT_CELLS = 40
 POINTS = 60
 # Tolerance of the least distance of legs over a step, over the reach.
 TOLERANCE = 1e-4
-# Number of stages of the computation.
-STAGES = 4
 # Relative tolerance of a radius at which a cell is still accessible.
 SAME = 1e-9
 
@@ -71,44 +67,27 @@ class RadiusCurve:
         """The position at which that pair comes closest, shape (3,); NaN if there is none."""
         return self.least.position[self.least.clearance.argmin()]
 
-    def radius_at(self, share: float) -> float:
-        """Return the radius at which a share of the volume at radius 0 is left."""
-        return float(np.interp(-share * float(self.volumes[0]), -self.volumes, self.radii))
-
 
 @computed_once
-def radius_curve(
-    workspace: Workspace,
-    *,
-    start: Triple | None = None,
-    cells: int = DEFAULT_CELLS,
-    watch: Watch = ignore_stage,
-) -> RadiusCurve:
+def radius_curve(workspace: Workspace, *, cells: int = DEFAULT_CELLS) -> RadiusCurve:
     """Compute the accessible volume against one radius of all legs.
 
     Args:
         workspace: The workspace; the radii of its design are ignored.
-        start: Position from which moves start, shape (3,); that of the home pose if None.
         cells: Number of cells of the grid on each axis of the workspace's extent.
-        watch: Called before each stage.
 
     Raises:
-        InputError: The start breaks a limit, or legs cross there.
+        InputError: Home breaks a limit, or legs cross there.
     """
     design = workspace.design
-    p = np.array(design.home_pose.position if start is None else start)
+    p = np.array(design.home_pose.position)
     thin = Workspace(with_radius(design, 0.0), workspace.rotation)
-    stages = Stages(watch, STAGES)
-    stages.begin("solid of the limits")
     whole = whole_solid(thin)
     if whole.is_empty:
         return RadiusCurve(np.zeros(1), np.zeros(1), least_clearances(thin))
     check_start(thin, p)
-    stages.begin("least clearances")
     least = least_clearances(thin)
-    stages.begin("grid of positions")
     surveyed = survey(thin, make_cell_grid(*whole.ends, cells))
-    stages.begin("widest paths")
     widest = 0.5 * _bottleneck_clearances(surveyed, p)[surveyed.within]
     radii = np.linspace(0.0, float(widest.max(initial=0.0)), POINTS)
     # A cell is accessible with radii up to its own, to rounding.

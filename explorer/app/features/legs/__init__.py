@@ -1,1 +1,1 @@
-"""Clearances of the legs, swept tetrahedra and radii."""
+"""Clearances of the legs, and swept tetrahedra."""

@@ -25,7 +25,6 @@ from explorer.numerics.number_text import format_apart, format_number
 from explorer.numerics.search import Watch, ignore_stage
 from explorer.statics.reactions import has_limits
 from explorer.workspace.accessible.nodes import InvalidStartError
-from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
 from explorer.workspace.accessible.workspace import PairCost, accessible_part
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.extremes import extent_of
@@ -295,17 +294,6 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         nodes=nodes,
         levels=on_map.bands.levels,
     )
-
-
-def draw_radius_curve(request: Selection, channel: Channel | None = None) -> RadiusCurve | Trouble:
-    """Return the accessible volume over the radius of all legs, or why there is no curve.
-
-    The legs of the design have no radii.
-    """
-    try:
-        return radius_curve(request.workspace, start=request.start, watch=watch_of(channel))
-    except ExplorerError as error:
-        return trouble_of(error)
 
 
 def map_measure(design: Design, colour: Measure, *, holds: bool) -> PositionMeasure:
