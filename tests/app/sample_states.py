@@ -199,7 +199,7 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: Accept(),
     lambda state, i, share: Pin(state.design),
     lambda state, i, share: Unpin(i % 3),
-    lambda state, i, share: Change("compared.look", {"shows": "bars", "overlay": share < 0.5}),
+    lambda state, i, share: Change("compared.look", {"overlay": share < 0.5}),
     lambda state, i, share: BrushAxes((Brush("volume", ((share, 10.0),)),)),
 )
 

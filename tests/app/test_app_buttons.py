@@ -53,6 +53,8 @@ from explorer.page.widgets.assigning import Assigner
 pytestmark = pytest.mark.usefixtures("idle_jobs")
 
 FILLED = "is-main"
+# Of files with classes of the stylesheet.
+SUFFIXES = (".py", ".js", ".svg")
 ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=10_000)
 
 
@@ -163,7 +165,7 @@ def test_button_in_markup_is_escaped() -> None:
 
 def test_every_class_of_the_markup_has_a_rule_and_every_rule_a_class() -> None:
     rooms = [SOURCES / "explorer" / room for room in ("page", "app")]
-    paths = [path for room in rooms for path in room.rglob("*") if path.suffix in (".py", ".js")]
+    paths = [path for room in rooms for path in room.rglob("*") if path.suffix in SUFFIXES]
     sources = "".join(path.read_text("utf-8") for path in paths)
     used = set(re.findall(r"\b(?<!data-)ex-[a-z]+(?:-[a-z]+)*\b", sources))
     sheet = look.read_file("page.css")

@@ -20,9 +20,7 @@ from explorer.app.features.compare.feature import ComparePanel, Pin, Unpin
 from explorer.app.features.compare.scene import APART, SCENES
 from explorer.app.features.compare.state import Compared, CompareView
 from explorer.app.features.compare.table import (
-    DRAWN,
     ComparedDesign,
-    bars,
     best_of,
     columns_of,
     notes,
@@ -193,7 +191,6 @@ def test_empty_workspace_of_a_name_with_markup_is_shown_with_its_reasons() -> No
     assert rows["clearance units"][1] == "–"
     (note,) = notes(compared(empty), found)
     assert "A (&lt;b onclick=x&gt;&amp;) has an empty workspace; emptied by: " in note
-    assert "–" in bars(found)
     assert "<b onclick" not in html + note
 
 
@@ -210,17 +207,6 @@ def test_same_manipulator_in_other_units_has_the_same_values_and_a_note() -> Non
     assert notes(state, found) == []
     (note,) = notes(Set("view.lengths", "design units").apply(state), found)
     assert "in units of the live design, of 10 mm" in note
-
-
-def test_bars_are_as_long_as_their_values() -> None:
-    found = columns(INITIAL, variant(2))
-    html = bars(found)
-    widths = [float(width) for width in re.findall(r"--share:([\d.]+)%", html)]
-    per_drawing = np.array(widths).reshape(len(DRAWN), len(found))
-    for name, drawn in zip(DRAWN, per_drawing, strict=True):
-        values = np.array([column.value(CATALOGUE[name]) for column in found], dtype=np.float64)
-        if values.max() > 0.0:
-            assert drawn == pytest.approx(100.0 * values / values.max(), abs=0.01), name
 
 
 LIGHT = msgspec.structs.replace(
@@ -398,8 +384,7 @@ def test_panel_pins_opens_unpins_and_switches(
     ]
     assert Compared.of(desk.state).pinned == (own, variant(7), None)
     desk.press(buttons, "compare.turn", "Overlay workspaces")
-    desk.press(buttons, "compare.turn", "Bars")
-    assert Compared.of(desk.state).look == CompareView(shows="bars", overlay=True)
+    assert Compared.of(desk.state).look == CompareView(overlay=True)
     desk.press(buttons, "compare.unpin", "A")
     assert Compared.of(desk.state).pinned == (None, variant(7), None)
 

@@ -13,18 +13,17 @@ from explorer.mechanism.design_file import PRESETS
 def test_button_in_markup_that_is_pressed_by_a_key_keeps_the_focus(tab: Tab) -> None:
     tab.turn_to("Compare")
     tab.running.page.session.do(Pin(PRESETS["paper-initial"]))
-    bars = tab.page.get_by_role("button", name="Bars", exact=True)
-    bars.wait_for()
+    overlay = tab.page.get_by_role("button", name="Overlay workspaces", exact=True)
+    overlay.wait_for()
     tab.settle()
     tab.page.get_by_role("button", name="Pin this design").focus()
-    for _ in range(3):
-        tab.page.keyboard.press("Tab")
-    expect(bars).to_be_focused()
+    tab.page.keyboard.press("Tab")
+    expect(overlay).to_be_focused()
     tab.page.keyboard.press("Enter")
-    tab.wait_for(lambda: Compared.of(tab.state).look.shows == "bars", "bars")
+    tab.wait_for(lambda: Compared.of(tab.state).look.overlay, "overlay")
     # The markup is another by then.
-    expect(bars).to_have_attribute("aria-pressed", "true")
-    expect(bars).to_be_focused()
+    expect(overlay).to_have_attribute("aria-pressed", "true")
+    expect(overlay).to_be_focused()
     # Neither is lost by what is pressed twice.
     outlines = tab.page.get_by_role("button", name="Outlines", exact=True)
     for pressed in ("true", "false"):

@@ -33,7 +33,6 @@ class StateCommand:
         keys: Keys that run it, told in the hint of its button.
         words: Words on its button; the last step of its label if "".
         spoken: Name of its button for screen readers; the words if "".
-        is_visible: Function that tells whether its button stands in its row.
     """
 
     label: str
@@ -44,7 +43,6 @@ class StateCommand:
     keys: tuple[Key, ...] = ()
     words: str = ""
     spoken: str = ""
-    is_visible: Callable[[State], bool] = lambda _: True
 
     @property
     def own_words(self) -> str:
@@ -146,7 +144,5 @@ class Chips:
     def buttons(self, state: State) -> str:
         """Return the buttons alone as HTML."""
         return "".join(
-            each.html(self._name, value, "ex-chip", state)
-            for value, each in self._commands.items()
-            if each.is_visible(state)
+            each.html(self._name, value, "ex-chip", state) for value, each in self._commands.items()
         )

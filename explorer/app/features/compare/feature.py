@@ -13,7 +13,7 @@ import viser
 
 from explorer.app.features.compare.scene import SCENES
 from explorer.app.features.compare.state import SLOTS, Compared
-from explorer.app.features.compare.table import ComparedDesign, bars, columns_of, notes, table
+from explorer.app.features.compare.table import ComparedDesign, columns_of, notes, table
 from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
@@ -24,8 +24,8 @@ from explorer.app.state.geometry import without_name
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.chips import Chips, Effect, StateCommand, choose, turn
-from explorer.app.widgets.markup import box, swatch
+from explorer.app.widgets.chips import Chips, StateCommand, turn
+from explorer.app.widgets.markup import box
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
@@ -73,54 +73,26 @@ class Unpin(Action):
         return with_value(state, f"compared.pinned.{self.slot}", None)
 
 
-def _look(
-    label: str,
-    does: str,
-    effect: Effect,
-    words: str = "",
-    is_visible: Callable[[State], bool] = lambda _: True,
-) -> tuple[str, StateCommand]:
-    """Return a way to look at pinned designs as what a press sends, and its command."""
-    return label, StateCommand(
+LOOKS = {
+    label: StateCommand(
         f"Compare › {label}",
         does,
-        *effect,
+        *turn(f"compared.look.{name}", label),
         lambda state: not Compared.of(state).is_empty,
-        words=words,
-        is_visible=is_visible,
     )
-
-
-LOOKS = (
-    _look(
-        "Table",
-        "Show every measure of the designs side by side.",
-        choose("compared.look.shows", "table", "Compared as"),
-    ),
-    _look(
-        "Bars",
-        "Draw the measures of the designs as bars.",
-        choose("compared.look.shows", "bars", "Compared as"),
-    ),
-    _look(
-        "Overlay workspaces",
-        "Draw the workspaces over one another in the colours of the designs, to true size, each "
-        "at the orientation of its home.",
-        turn("compared.look.overlay", "Overlay workspaces"),
-    ),
-    _look(
-        "Live one as it is turned",
-        "Draw the workspace of the live design at its present orientation, rather than at home.",
-        turn("compared.look.at_pose", "Live one as it is turned"),
-        "live as turned",
-        lambda state: Compared.of(state).look.overlay,
-    ),
-    _look(
-        "Outlines",
-        "Outline base, legs and platform of the pinned designs in their home poses.",
-        turn("compared.look.outlines", "Outlines"),
-    ),
-)
+    for label, name, does in (
+        (
+            "Overlay workspaces",
+            "overlay",
+            "Draw the workspaces at home over one another, in the designs' colours, to true size.",
+        ),
+        (
+            "Outlines",
+            "outlines",
+            "Outline base, legs and platform of the pinned designs in their home poses.",
+        ),
+    )
+}
 
 
 def _open(slot: int, state: State) -> Open:
@@ -143,7 +115,7 @@ PLACE_BUTTONS: tuple[tuple[str, Callable[[int, State], Action], str, str], ...] 
 
 
 class ComparePanel:
-    """The table or bars of the compared designs, and buttons that pin and unpin them."""
+    """The table of the compared designs, and buttons that pin and unpin them."""
 
     def __init__(self, services: Services) -> None:
         self._session = services.session
@@ -151,7 +123,7 @@ class ComparePanel:
         self._library = None if services.user_data is None else services.get(SavedDesigns)
         self.html = services.gui.add_html("")
         self._add_buttons(services)
-        self._looks = Chips(services.buttons, services.session, "compare.turn", "", dict(LOOKS))
+        self._looks = Chips(services.buttons, services.session, "compare.turn", "", LOOKS)
         self._key: tuple[object, ...] = ()
         self._content = ""
 
@@ -196,22 +168,13 @@ class ComparePanel:
                 "their workspaces can be drawn over one another.</div>",
                 f'<div class="ex-flow">{pins}</div>',
             )
-        if compared.look.shows == "table":
-            body = table(columns)
-        else:
-            legend = "".join(
-                f'<span class="ex-whole">{swatch(column.colour)}'
-                f"<b>{column.letter}</b> {escape(column.design.name)}</span>"
-                for column in columns
-            )
-            body = f'<div class="ex-flow ex-apart">{legend}</div>{bars(columns)}'
         remarks = "".join(
             f'<div class="ex-dim ex-after">{note}</div>' for note in notes(state, columns)
         )
         return box(
             f'<div class="ex-flow ex-before">{pins}<span class="ex-divider"></span>'
             f"{self._looks.buttons(state)}</div>",
-            body,
+            table(columns),
             remarks,
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from explorer.app.state.geometry import without_name
 from explorer.app.state.parts import FeaturePart
@@ -17,15 +17,9 @@ Pinned: TypeAlias = tuple[Design | None, Design | None, Design | None]
 
 @dataclass(frozen=True)
 class CompareView:
-    """How designs are compared: as a table or bars, in the scene over one another, or as outlines.
+    """How designs are compared in the scene: by their workspaces over one another, by outlines."""
 
-    With `at_pose` the workspace of the live design has its present orientation, not that of
-    home.
-    """
-
-    shows: Literal["table", "bars"] = "table"
     overlay: bool = False
-    at_pose: bool = False
     outlines: bool = False
 
 

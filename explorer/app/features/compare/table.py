@@ -1,4 +1,4 @@
-"""Designs side by side: a column for each design, its measures as a table or as bars."""
+"""Designs side by side: a column for each design, a row for each measure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
 from explorer.measures.blocks.block import Look
-from explorer.measures.catalogue import CATALOGUE, Measure, Measurements, measures_in
+from explorer.measures.catalogue import Measure, Measurements, measures_in
 from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics import number_text
@@ -35,24 +35,6 @@ FIRSTS = (
     "home_load_share",
     "yaw",
 )
-DRAWN = (
-    "volume",
-    "volume_per_leg",
-    "node_volume",
-    "reach",
-    "exact_extent_x",
-    "exact_extent_y",
-    "exact_extent_z",
-    "least_clearance",
-    "least_margin",
-    "mean_margin",
-    "home_margin",
-    "mean_inverse_condition",
-)
-"""The measures that are drawn as bars, row by row."""
-
-LOADS = ("home_load_share", "home_largest_payload", "home_largest_bending", "held_volume")
-"""The measures of a further row, each drawn if a design has what it needs."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +59,7 @@ class ComparedDesign:
 
     @property
     def colour(self) -> Rgb:
-        """The colour of the design in tables, bars and the scene."""
+        """The colour of the design in tables and the scene."""
         return COMPARED[self.number]
 
     def own_value(self, measure: Measure) -> float | None:
@@ -265,33 +247,3 @@ def _exact_text(measure: Measure, column: ComparedDesign) -> str:
         return column.unit_of(measure).text(value, 12)
     size, units = column.design.reach**3, (number_text.UNITS, column.design.millimetres)
     return " = ".join(unit.to_power(measure.power, size).text(value, 12) for unit in units)
-
-
-def bars(columns: Sequence[ComparedDesign]) -> str:
-    """Return some of the measures as bars from zero, in HTML."""
-    loads = (name for name in LOADS if any(each.has(CATALOGUE[name]) for each in columns))
-    drawings = (_drawing(CATALOGUE[name], columns) for name in (*DRAWN, *loads))
-    return f'<div class="ex-bars ex-small">{"".join(drawings)}</div>'
-
-
-def _drawing(measure: Measure, columns: Sequence[ComparedDesign]) -> str:
-    values = [column.value(measure) for column in columns]
-    best, size = best_of(measure, values), _size_of(values)
-    arrow = {"more": " ↑", "less": " ↓", None: ""}[measure.sense]
-    # How it was measured only the hint has room to say.
-    label = measure.label.removesuffix(" at nodes")
-    label = label.removesuffix(" at home") if measure.name in LOADS else label
-    rows = [
-        markup.row(
-            markup.dim(column.letter),
-            markup.meter(100.0 * max(0.0, value or 0.0) / (size or 1.0), column.colour),
-            "–" if value is None else value_text(measure, value, size),
-            look="ex-strong" if index in best else "",
-        )
-        for index, (column, value) in enumerate(zip(columns, values, strict=True))
-    ]
-    unit = markup.dim(f"{columns[0].unit_of(measure).name}{arrow}")
-    return (
-        f'<div title="{escape(_hint_of(measure))}"><b>{escape(label)}</b> {unit}'
-        f"{markup.table(rows)}</div>"
-    )

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TypeAlias
 
-import numpy as np
-
 from explorer.app.features.compare.state import SLOTS, Compared
-from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, kept_workspace, rows_of
+from explorer.app.features.workspace.work import LIVE_TOLERANCE
 from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
 from explorer.app.session.feed import Feed, FeedOf
@@ -42,13 +40,11 @@ NO_COLOUR: Rgb = (0, 0, 0)
 class ComparedRequest:
     """Request to measure a design, and to draw its workspace; lengths in design units.
 
-    The rotation of the drawn workspace, rows of its matrix, is that of the home pose if None;
-    the chord tolerance of its mesh a share of the reach.
+    The chord tolerance of its mesh is a share of the reach if None.
     """
 
     design: Design
     drawn: bool = False
-    rotation: Rows | None = None
     tolerance: float | None = None
 
 
@@ -67,10 +63,9 @@ class ComparedDrawing:
     problem: str | None = None
 
     def offset(self, at: Point) -> FloatArray:
-        """Return the vector from b4 to a point in the orientation of the drawing, shape (3,)."""
-        design, rows = self.request.design, self.request.rotation
-        rotation = design.home_pose.rotation if rows is None else np.array(rows)
-        return offset_of(design, rotation, at)
+        """Return the vector from b4 to a point in the orientation of home, shape (3,)."""
+        design = self.request.design
+        return offset_of(design, design.home_pose.rotation, at)
 
 
 def draw_compared(request: ComparedRequest) -> ComparedDrawing:
@@ -83,9 +78,7 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
         case = _kept_case(design)
         measurements = measure_design(case, measures_in("compare"))
         if request.drawn:
-            rows = request.rotation
-            workspace = case.workspace if rows is None else kept_workspace(design, rows)
-            solid = whole_solid(workspace, request.tolerance or LIVE_TOLERANCE * design.reach)
+            solid = whole_solid(case.workspace, request.tolerance or LIVE_TOLERANCE * design.reach)
             if not solid.is_empty:
                 shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
@@ -112,9 +105,7 @@ def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
     if tolerance is not None:
         # The tolerance in millimetres is that of the live design.
         tolerance /= unit_ratio(design, state.design)
-    is_turned = column == LIVE and compared.look.at_pose
-    rotation = rows_of(frame.snapshot.rotation) if is_turned else None
-    return ComparedRequest(without_name(design), drawn=True, rotation=rotation, tolerance=tolerance)
+    return ComparedRequest(without_name(design), drawn=True, tolerance=tolerance)
 
 
 FEEDS = tuple(
