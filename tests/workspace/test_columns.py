@@ -13,10 +13,10 @@ from explorer import PRESETS, Actuators, Design, Guide, Limits, Payload, Pose, S
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.load_cases import load_case
-from explorer.workspace.limits.constraints import BallOrCylinder
+from explorer.workspace.limits.constraints import BallOrCylinder, Cone
 from explorer.workspace.limits.region import Region, region_of
 from explorer.workspace.slices.column_volume import ColumnVolume, volume_of_columns
-from explorer.workspace.slices.volume import region_volume
+from explorer.workspace.slices.volume import COLUMN_ERROR, region_volume
 from explorer.workspace.workspace import Workspace
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -76,15 +76,39 @@ def test_with_a_load_the_volume_is_that_of_finer_columns(
     assert (found.box[0] <= fine.box[1]).all()
 
 
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("half_angle", [0.5, 1.2, 0.5 * np.pi, 2.5])
+def test_with_a_cone_from_its_centre_a_ball_keeps_the_share_of_its_directions(
+    half_angle: float, flat: bool
+) -> None:
+    rng = np.random.default_rng(int(10.0 * half_angle))
+    centre, axis = rng.normal(size=3), rng.normal(size=3) * ((0.0, 1.0, 1.0) if flat else 1.0)
+    axis /= np.linalg.norm(axis)
+    ball = BallOrCylinder("", centre, 2.0, is_ball=True, inside=True)
+    share = half_angle / np.pi if flat else 0.5 - 0.5 * np.cos(half_angle)
+    region = region_of([ball, Cone("", centre, axis, half_angle, flat)])
+    volume, error, gradient = region_volume(region)
+    assert volume == pytest.approx(4.0 / 3.0 * np.pi * 8.0 * share, abs=error)
+    assert error <= COLUMN_ERROR * volume
+    assert not gradient
+
+
 @pytest.mark.parametrize("half_angle", [40.0, 90.0, 120.0])
-def test_with_cones_the_volume_is_that_of_columns_along_z(half_angle: float) -> None:
+def test_with_cones_the_volume_is_that_of_finer_columns_and_of_a_grid(
+    half_angle: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     limits = Limits(margin=0.0, box=OPTIMAL.limits.box, swing=Swing(a1=half_angle, b2=half_angle))
     design = msgspec.structs.replace(FULL, limits=limits)
-    region = Workspace(design, OPTIMAL.home_pose.rotation).region
-    volume, error, _ = region_volume(region)
-    found = volume_of_columns(region, TOLERANCE)
-    assert volume > 100.0
-    check(found, volume, 3.0 * error + 1e-4 * volume)
+    workspace = Workspace(design, OPTIMAL.home_pose.rotation)
+    found = volume_of_columns(workspace.region, TOLERANCE)
+    lows, highs = workspace.region.ends
+    nodes = (np.indices((120,) * 3).reshape(3, -1).T + 0.5) / 120.0
+    counted = workspace.contains(lows + (highs - lows) * nodes).mean() * np.prod(highs - lows)
+    monkeypatch.setattr("explorer.workspace.slices.column_volume.PANELS", 40)
+    fine = volume_of_columns(workspace.region, FINE)
+    assert fine.volume > 100.0
+    check(found, fine.volume, fine.error)
+    assert fine.volume == pytest.approx(counted, rel=3e-3)
 
 
 def test_a_load_that_is_held_nowhere_leaves_no_volume() -> None:

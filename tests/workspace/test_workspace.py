@@ -33,7 +33,7 @@ from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import YAW
-from explorer.workspace.limits.region import column_lengths, region_of
+from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.integration import (
     RESULTS,
     TOTAL,
@@ -81,18 +81,6 @@ def test_nodes_counted_satisfy_every_limit(seed: int) -> None:
     if nodes.extent is not None:
         inside = grid[kept]
         np.testing.assert_allclose(nodes.extent, [inside.min(axis=0), inside.max(axis=0)])
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_volume_is_the_sum_of_columns(seed: int) -> None:
-    design, rotation = ordinary_case(seed)
-    region, many = region_of(Workspace(design, rotation).limits), 500
-    assert len(region.cones) == 0
-    lows, highs = region.ends
-    total = np.zeros(1)
-    column_lengths(many * many, *region.rows, lows, highs, many, total)
-    volume = float(total[0] * (highs[0] - lows[0]) * (highs[1] - lows[1])) / many**2
-    assert volume == pytest.approx(workspace_volume(design, rotation).volume, rel=1e-3)
 
 
 def varied(design: Design, rotation: FloatArray, name: str, by: float) -> tuple[Design, FloatArray]:

@@ -1,4 +1,4 @@
-"""Regions: intersections of limits as rows of numbers, their nodes and columns, boxes around them.
+"""Regions: intersections of limits as rows of numbers, their nodes, and boxes around them.
 
 A circle is a row (x, y, z, radius, is_ball, side): a sphere about (x, y, z), or a cylinder along
 the x-axis through that point. Their slices at constant x are circles. The region lies inside the
@@ -32,10 +32,6 @@ SAME = 1e-12
 # Approximate number of cells in each round of contracting a box, most rounds, and the share of the
 # box's volume of which a round that leaves more is the last.
 CELLS, MOST_ROUNDS, WORTH_WHILE = 4096, 60, 0.8
-# The most ends of z-intervals in one column: two for each surface and two of the column.
-ENDS = 64
-# A discriminant that is negative by less than this share of b² counts as zero.
-DOUBLE_ROOT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -259,79 +255,3 @@ def mark_nodes(
             for k in range(within.shape[2]):
                 z = first[2] + k * step[2]
                 within[i, j, k] = is_within(x, y, z, circles, planes, cones, slack)
-
-
-@helper
-def add_crossings(a: float, b: float, c: float, ends: FloatArray, count: int) -> int:
-    """Add the real roots of a z² + 2 b z + c to the ends and return the count of ends."""
-    if a == 0.0:
-        if b != 0.0:
-            ends[count] = -0.5 * c / b
-            count += 1
-        return count
-    square = b * b - a * c
-    # Rounding may hide a double root, which a cone of 90° has; a superfluous end does no harm.
-    if square > -DOUBLE_ROOT * b * b:
-        root = math.sqrt(max(0.0, square))
-        ends[count], ends[count + 1] = (-b - root) / a, (-b + root) / a
-        count += 2
-    return count
-
-
-@helper
-def sort_ends(ends: FloatArray, count: int) -> None:
-    """Sort the first few ends in place."""
-    for i in range(1, count):
-        end, j = ends[i], i
-        while j > 0 and ends[j - 1] > end:
-            ends[j] = ends[j - 1]
-            j -= 1
-        ends[j] = end
-
-
-@kernel("void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], i8, f8[::1])")
-def column_lengths(
-    circles: FloatArray,
-    planes: FloatArray,
-    cones: FloatArray,
-    lows: FloatArray,
-    highs: FloatArray,
-    per_axis: int,
-    total: FloatArray,
-) -> None:
-    """Add up the exact z-lengths of a region in columns at the centres of per_axis² cells.
-
-    The cells are those of a box with the ends `lows` and `highs`, which holds the region.
-    Written to `total`: the sum of the lengths, shape (1,).
-    """
-    ends = np.zeros(ENDS)
-    total[0] = 0.0
-    for i in range(per_axis):
-        x = lows[0] + (highs[0] - lows[0]) * (i + 0.5) / per_axis
-        for j in range(per_axis):
-            y = lows[1] + (highs[1] - lows[1]) * (j + 0.5) / per_axis
-            ends[0], ends[1] = lows[2], highs[2]
-            count = 2
-            for k in range(circles.shape[0]):
-                dy, dx = y - circles[k, Y], circles[k, IS_BALL] * (x - circles[k, X])
-                rest = dx * dx + dy * dy - circles[k, RADIUS] * circles[k, RADIUS]
-                zc = circles[k, Z]
-                count = add_crossings(1.0, -zc, zc * zc + rest, ends, count)
-            for k in range(planes.shape[0]):
-                rest = planes[k, X] * x + planes[k, Y] * y - planes[k, OFFSET]
-                count = add_crossings(0.0, 0.5 * planes[k, Z], rest, ends, count)
-            for k in range(cones.shape[0]):
-                dx = 0.0 if cones[k, IS_FLAT] > 0.0 else x - cones[k, X]
-                dy, zc = y - cones[k, Y], cones[k, Z]
-                # (off·axis)² = cos² |off|², as a polynomial in z - zc.
-                xy_along = dx * cones[k, AXIS_X] + dy * cones[k, AXIS_Y]
-                square = cones[k, COSINE] * cones[k, COSINE]
-                a = cones[k, AXIS_Z] * cones[k, AXIS_Z] - square
-                b = xy_along * cones[k, AXIS_Z]
-                c = xy_along * xy_along - square * (dx * dx + dy * dy)
-                count = add_crossings(a, b - a * zc, a * zc * zc - 2.0 * b * zc + c, ends, count)
-            sort_ends(ends, count)
-            for k in range(count - 1):
-                low, high = max(ends[k], lows[2]), min(ends[k + 1], highs[2])
-                if high > low and is_within(x, y, 0.5 * (low + high), circles, planes, cones, 0.0):
-                    total[0] += high - low

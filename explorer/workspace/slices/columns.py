@@ -29,9 +29,7 @@ from explorer.workspace.limits.region import (
     X,
     Y,
     Z,
-    add_crossings,
     is_within,
-    sort_ends,
 )
 from explorer.workspace.slices.arcs import END, START, sort_arcs
 from explorer.workspace.slices.polynomials import polynomial_at, write_roots
@@ -131,18 +129,22 @@ def forbid_by_cone(
     k: int, y: float, z: float, c: Column, low: float, high: float, count: int
 ) -> int:
     """Add the intervals of a column outside a cone; return the count of forbidden intervals."""
-    cones, ends = c.cones, c.values[3]
+    cones, first, second = c.cones, math.inf, math.inf
     free, dy, dz = 1.0 - cones[k, IS_FLAT], y - cones[k, Y], z - cones[k, Z]
     along = dy * cones[k, AXIS_Y] + dz * cones[k, AXIS_Z]
     square = cones[k, COSINE] * cones[k, COSINE]
     # (off·axis)² = cos² |off|², as a polynomial in x - xc.
     a = free * (cones[k, AXIS_X] * cones[k, AXIS_X] - square)
     b, rest = free * along * cones[k, AXIS_X], along * along - square * (dy * dy + dz * dz)
-    found = add_crossings(a, b, rest, ends, 0)
-    sort_ends(ends, found)
+    if a != 0.0:
+        # Rounding may hide a double root, which a cone of 90° has; a superfluous end does no harm.
+        root = math.sqrt(max(0.0, b * b - a * rest)) / a
+        first, second = min(-b / a - root, -b / a + root), max(-b / a - root, -b / a + root)
+    elif b != 0.0:
+        first = -0.5 * rest / b
     start = low
-    for i in range(found + 1):
-        end = min(max(ends[i] + cones[k, X], start), high) if i < found else high
+    for root in (first, second, math.inf):
+        end = min(max(root + cones[k, X], start), high)
         middle = 0.5 * (start + end)
         if end > start and not is_within(
             middle, y, z, c.circles[:0], c.planes[:0], cones[k : k + 1], 0.0

@@ -8,7 +8,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
 
 # Steps and accuracy of the roots of a polynomial on [-1, 1].
-ROOT_STEPS, ROOT_ERROR = 60, 1e-10
+ROOT_STEPS, ROOT_ERROR = 60, 1e-15
 
 
 @helper

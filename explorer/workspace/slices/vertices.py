@@ -24,10 +24,8 @@ from explorer.workspace.slices.arcs import (
     region_size,
     slack_at,
 )
-from explorer.workspace.slices.polynomials import real_roots
+from explorer.workspace.slices.polynomials import real_roots, write_roots
 
-# The most steps of Newton's method, which bisects its interval where a step would leave it.
-MOST_STEPS = 100
 # Planes and lines at an angle with a smaller sine count as parallel.
 PARALLEL = 1e-14
 # Breaks closer together than this share of the x-range are merged.
@@ -161,60 +159,6 @@ def add_breaks_of_planes(boundary: Boundary, cuts: FloatArray) -> None:
 
 
 @helper
-def find_root(a: FloatArray, low: float, high: float) -> float:
-    """Return the root of a quartic (lowest power first) between ends where its signs differ."""
-    rises = a[0] + high * (a[1] + high * (a[2] + high * (a[3] + high * a[4]))) > 0.0
-    t = 0.5 * (low + high)
-    for _ in range(MOST_STEPS):
-        value = a[0] + t * (a[1] + t * (a[2] + t * (a[3] + t * a[4])))
-        slope = a[1] + t * (2.0 * a[2] + t * (3.0 * a[3] + t * 4.0 * a[4]))
-        if (value > 0.0) == rises:
-            high = t
-        else:
-            low = t
-        step = value / slope if slope != 0.0 else math.inf
-        following = t - step
-        if not low < following < high:
-            following = 0.5 * (low + high)
-        if abs(following - t) <= 1e-16 or not low < following < high:
-            break
-        t = following
-    return t
-
-
-@helper
-def write_quartic_roots(a: FloatArray, roots: FloatArray) -> int:
-    """Write the real roots of a quartic (lowest power first) in [-1, 1]; return their count.
-
-    The roots of each derivative separate those of the polynomial before it.
-    """
-    stops, derived = np.zeros(6), np.zeros((5, 5))
-    for power in range(5):
-        derived[0, power] = a[power]
-    for k in range(1, 4):
-        for power in range(4):
-            derived[k, power] = (power + 1) * derived[k - 1, power + 1]
-    stops[0], stops[1] = -1.0, 1.0
-    count = 0
-    for k in range(3, -1, -1):
-        new_count = 0
-        b = derived[k]
-        before = b[0] - b[1] + b[2] - b[3] + b[4]
-        for i in range(count + 1):
-            low, high = stops[i], stops[i + 1]
-            after = b[0] + high * (b[1] + high * (b[2] + high * (b[3] + high * b[4])))
-            if (before > 0.0) != (after > 0.0):
-                roots[new_count] = find_root(b, low, high)
-                new_count += 1
-            before = after
-        count = new_count
-        for i in range(count):
-            stops[i + 1] = roots[i]
-        stops[count + 1] = 1.0
-    return count
-
-
-@helper
 def add_breaks_of_circle(boundary: Boundary, ball: int, cut: FloatArray, slack: float) -> None:
     """Add vertices where the circle in which a plane cuts a sphere meets cylinders."""
     circles = boundary.circles
@@ -230,7 +174,7 @@ def add_breaks_of_circle(boundary: Boundary, ball: int, cut: FloatArray, slack: 
     # Seen along x it is an ellipse: r along e, and r |nx| along f.
     fy, fz = ny / across, nz / across
     ey, ez = fz, -fy
-    a, roots = np.zeros(5), np.zeros(4)
+    a, derivative, roots = np.zeros(5), np.zeros(5), np.zeros(5)
     for k in range(circles.shape[0]):
         if circles[k, IS_BALL] > 0.0:
             continue
@@ -246,7 +190,7 @@ def add_breaks_of_circle(boundary: Boundary, ball: int, cut: FloatArray, slack: 
             a[4] = semi_f * semi_f + 2.0 * semi_f * v + rest
             a[2] = 4.0 * r * r - 2.0 * semi_f * semi_f + 2.0 * rest
             a[1] = a[3] = -4.0 * r * u
-            for i in range(write_quartic_roots(a, roots)):
+            for i in range(write_roots(a, derivative, roots)):
                 t = roots[i]
                 sine, cosine = 2.0 * t / (1.0 + t * t), half * (1.0 - t * t) / (1.0 + t * t)
                 x = cx + r * across * cosine

@@ -2,8 +2,8 @@
 
 The volume is integrated from exact slice areas (`explorer.workspace.slices.integration`). Its error
 is that of rounding, which is larger for a thin shell, and is returned with it. Within the cones of
-swings the volume is the sum of `COLUMNS` columns an axis, good to about 1e-4. The paper counts the
-grid nodes at multiples of a step, boundary included, times the cube of the step; such a node volume
+swings the volume is integrated over columns, good to `COLUMN_ERROR`. The paper counts the grid
+nodes at multiples of a step, boundary included, times the cube of the step; such a node volume
 exceeds the true volume by an amount that is proportional to the surface.
 """
 
@@ -22,14 +22,14 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import positive
 from explorer.numerics.computed_once import computed_once
 from explorer.workspace.limits.constraints import BallOrCylinder, Constraint
-from explorer.workspace.limits.region import Region, column_lengths, mark_nodes, region_of
+from explorer.workspace.limits.region import Region, mark_nodes, region_of
 from explorer.workspace.slices.integration import volume_of_slices
 from explorer.workspace.workspace import Workspace
 
-# Columns per axis for workspaces with cones, whose slices are not bounded by circles.
-COLUMNS = 400
-# Columns per axis that are enough to decide whether there is a volume.
-COARSE_COLUMNS = 80
+COLUMN_ERROR = 1e-4
+"""Largest error of the volume within cones, whose slices are not bounded by circles, over it."""
+# Such an error with which it is decided whether there is a volume.
+COARSE_ERROR = 0.1
 # The radius of a ball around all limits, over the largest distance of a limit from the origin.
 SURROUNDINGS = 4.0
 # The most nodes that are counted.
@@ -107,23 +107,21 @@ def emptying_limits(workspace: Workspace) -> tuple[str, ...]:
     return find_emptying_limits(workspace.limits)
 
 
-def region_volume(region: Region, columns: int = COLUMNS) -> tuple[float, float, dict[str, float]]:
+def region_volume(
+    region: Region, column_error: float = COLUMN_ERROR
+) -> tuple[float, float, dict[str, float]]:
     """Return the volume of a region, its error, and its derivatives by parameter.
 
-    With cones it is that of a number of columns per axis, without derivatives.
+    With cones it is that of columns, to an error over the volume, without derivatives.
     """
     if not len(region.cones):
         volume, error, gradient = volume_of_slices(region)
         return max(0.0, volume), error, gradient
-    if region.box is None:
-        return 0.0, 0.0, {}
-    lows, highs = region.box
-    volumes: list[float] = []
-    for per_axis in (columns // 2, columns):
-        total, count = np.zeros(1), per_axis * per_axis
-        column_lengths(count, *region.rows, lows, highs, per_axis, total)
-        volumes.append(float(total[0] * np.prod((highs - lows)[:2])) / count)
-    return volumes[1], abs(volumes[1] - volumes[0]), {}
+    # Few designs have cones, and columns load a kernel.
+    from explorer.workspace.slices.column_volume import volume_of_columns
+
+    found = volume_of_columns(region, column_error)
+    return found.volume, found.error, {}
 
 
 @computed_once
@@ -195,7 +193,7 @@ def find_emptying_limits(limits: Sequence[Constraint]) -> tuple[str, ...]:
 
     def is_empty(chosen: Collection[str]) -> bool:
         rest = [*(limit for limit in limits if limit.name in chosen), surroundings]
-        return region_volume(region_of(rest), COARSE_COLUMNS)[0] <= 0.0
+        return region_volume(region_of(rest), COARSE_ERROR)[0] <= 0.0
 
     sufficient = tuple(name for name in names if not is_empty({*names} - {name}))
     if sufficient:
