@@ -7,7 +7,7 @@ import io
 import os
 import signal
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
@@ -43,13 +43,10 @@ from explorer.app.features.paths.panel import (
     plan_words,
 )
 from explorer.app.features.paths.plots import (
-    FOLDS,
-    ChartQuantity,
     LoadPlot,
     crossing_time,
     crossing_words,
-    incidence_columns,
-    margins_in,
+    margin_columns,
 )
 from explorer.app.features.paths.state import STRAIGHT_SECONDS, End, Journey, Paths, journey_of
 from explorer.app.features.paths.work import DrivesRequest, draw_drives, request_for
@@ -63,7 +60,6 @@ from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.errors import InputError
 from explorer.jobs.jobs import Jobs
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.folds import to_folds
 from explorer.mechanism.kinematics import forward
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins, mode_of
@@ -265,29 +261,18 @@ def test_runner_plays_in_real_time_until_it_is_paused(bench: Bench) -> None:
 # The charts
 
 
-def folds_of(pose: Pose) -> FloatArray:
-    return np.abs(np.degrees(to_folds(pose.position, pose.rotation)[3:]))
-
-
 def margins_of(pose: Pose) -> FloatArray:
     return margins(pose.position, pose.rotation)
 
 
-@pytest.mark.parametrize(
-    ("quantity", "value_of"),
-    [(margins_in(UNITS), margins_of), (FOLDS, folds_of)],
-    ids=["margins", "folds"],
-)
 @pytest.mark.parametrize(("first", "last"), [(0, 7), (1, 4), (1, 5)])
-def test_chart_shows_margins_or_folds_of_the_poses_over_time(
-    quantity: ChartQuantity, value_of: Callable[[Pose], FloatArray], first: int, last: int
-) -> None:
+def test_chart_shows_margins_of_the_poses_over_time(first: int, last: int) -> None:
     journey = path_of(SetPathTime(3.0).apply(start_between(first, last)))
-    x, *curves, singular, now = incidence_columns(journey, quantity)
+    x, *curves, singular, now = margin_columns(journey, UNITS)
     assert (np.diff(x) >= 0.0).all()
     shown, is_singular = np.stack(curves, axis=1), np.isfinite(singular)
     for t, values in zip(x[~is_singular], shown[~is_singular], strict=True):
-        np.testing.assert_allclose(values, value_of(journey.pose_at(float(t))), atol=1e-6)
+        np.testing.assert_allclose(values, margins_of(journey.pose_at(float(t))), atol=1e-6)
     crossings = journey.margins.crossings
     times = [crossing_time(journey, i) for i in range(len(crossings))]
     assert x[is_singular].tolist() == pytest.approx(times)
@@ -295,12 +280,12 @@ def test_chart_shows_margins_or_folds_of_the_poses_over_time(
     for crossing, values, marked in zip(
         crossings, shown[is_singular], singular[is_singular], strict=True
     ):
-        np.testing.assert_allclose(values, value_of(crossing.pose), atol=1e-12)
+        np.testing.assert_allclose(values, margins_of(crossing.pose), atol=1e-12)
         assert marked == values[crossing.incidence - 1]
-        assert np.abs(np.subtract(quantity.flat, marked)).min() < 1e-5
+        assert abs(marked) < 1e-5
     assert x[np.isfinite(now)].tolist() == [journey.at, journey.at]
     low, high = now[np.isfinite(now)]
-    assert low < min(shown.min(), *quantity.flat) < max(shown.max(), *quantity.flat) < high
+    assert low < min(shown.min(), 0.0) < max(shown.max(), 0.0) < high
 
 
 def test_path_and_its_crossings_are_drawn(services: Services) -> None:

@@ -46,13 +46,11 @@ def swatch(colour: Rgb, look: str = "ex-swatch") -> str:
     return f'<span class="{look}" style="--colour:{css(colour)}"></span>'
 
 
-def margin_name(incidence: int, name: str = "δ{}") -> str:
-    """Return the name of the margin with a number, 1 to 3, in its colour; or of its fold."""
+def margin_name(incidence: int) -> str:
+    """Return the name of the margin with a number, 1 to 3, in its colour."""
     on_light, on_dark = margin_text(incidence)
     text, mark = by_theme(css(on_light), css(on_dark)), css(MARGIN_COLOURS[incidence - 1])
-    return (
-        f'<b class="ex-margin" style="--colour:{mark};--text:{text}">{name.format(incidence)}</b>'
-    )
+    return f'<b class="ex-margin" style="--colour:{mark};--text:{text}">δ{incidence}</b>'
 
 
 def table(rows: Iterable[str], head: Sequence[str] = ()) -> str:

@@ -123,10 +123,7 @@ class PathsPanel:
                 _time_span,
                 disabled=lambda state: journey_of(state) is None,
             )
-            self._incidences = (
-                plots.IncidencePlot(gui, plots.margins_in, has_times=False),
-                plots.IncidencePlot(gui, lambda _: plots.FOLDS),
-            )
+            self._margins = plots.MarginPlot(gui)
             self._loads = plots.LoadPlot(services)
         with gui.add_folder("Drives"):
             self._drives = DrivesPanel(services, self._controls)
@@ -169,7 +166,7 @@ class PathsPanel:
         title = plan_words(state) or path_title(state, self._loads.shares(frame), self._clear)
         yield self._title, "content", title
         yield from show_html(self._demand, plots.demand_note(state))
-        for part in (*self._incidences, self._loads, self._drives):
+        for part in (self._margins, self._loads, self._drives):
             yield from part.updates(frame)
         yield from self._controls.updates(frame)
 

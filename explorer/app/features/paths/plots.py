@@ -1,10 +1,10 @@
-"""The charts over the time of a path: margins, folds, and shares of the limits under a load."""
+"""The charts over the time of a path: margins, and shares of the limits under a load."""
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from html import escape
 from typing import Any, NamedTuple
 
@@ -30,23 +30,22 @@ from explorer.app.widgets.charts import (
 )
 from explorer.app.widgets.markup import margin_name, note, swatch
 from explorer.measures.blocks.block import MOST_SHARE, Share
-from explorer.mechanism.folds import to_folds
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import UNITS, Unit, format_decimals, format_number
+from explorer.numerics.number_text import Unit, format_decimals, format_number
 from explorer.page.widgets.assigning import Updates
 from explorer.paths.loads import DemandedLoad, PathLoads
 from explorer.singularity.colours import MARGIN_COLOURS
 from explorer.statics.reactions import PART_NAMES, has_limits
 
-# Dashes of the incidences' lines beside their colours, and the marks of the legend.
+# Dashes of the margins' lines beside their colours, and the marks of the legend.
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
 STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
 # Room above and below the values of a chart, as a share of their span.
 ROOM = 0.08
-# Heights of the charts between their axes, in pixels.
-INCIDENCE_HEIGHT, LOAD_HEIGHT = 78, 62
+# Heights of the charts between their axes, and the room for the numbers of time, in pixels.
+MARGIN_HEIGHT, LOAD_HEIGHT, TIME_ROOM = 78, 62, 26
 # Number of crossings that are listed; the others are counted.
 MOST_LISTED = 4
 # Least and greatest top of the chart, in percent; beyond it shares leave the chart.
@@ -56,8 +55,8 @@ LEAST_TOP, MOST_TOP = 120.0, 250.0
 class TimeChart:
     """A chart over time, whose axis has no words: the slider above the chart names it.
 
-    The series come without the line at the present time; the axes are the vertical one, and that of
-    its levels, at the right. A chart may have no numbers of time, if those of one below serve it.
+    The series come without the line at the present time; the axes are the vertical one, and that
+    of its levels, at the right.
     """
 
     def __init__(
@@ -66,18 +65,12 @@ class TimeChart:
         series: tuple[uplot.Series, ...],
         axes: tuple[uplot.Axis, uplot.Axis],
         height: int,
-        *,
-        has_times: bool = True,
     ) -> None:
-        room = 26 if has_times else 8
-        time = axis("", label_size=0, size=room)
-        if not has_times:
-            time["values"] = ()
         self._handle = add_chart(
             gui,
             (*series, line("now", NEUTRAL, width=1.5)),
-            (time, *axes),
-            height=8 + height + room,
+            (axis("", label_size=0, size=TIME_ROOM), *axes),
+            height=8 + height + TIME_ROOM,
             padding=(8, 0, 0, 0),
         )
 
@@ -148,86 +141,40 @@ def demand_note(state: State) -> str:
     return note("No part has a limit, so every load is held: see the tab Machine.")
 
 
-class ChartQuantity(NamedTuple):
-    """A number of each incidence that a chart shows; its name has braces for the incidence.
+class MarginPlot:
+    """The chart of the margins and its legend, empty while there is no path."""
 
-    It has the values `flat` where a fold is flat, and those `of` positions (..., 3) and rotations
-    (..., 3, 3) have the shape (..., 3).
-    """
-
-    name: str
-    vertical: uplot.Axis
-    flat: tuple[float, ...]
-    decimals: int
-    unit: str
-    of: Callable[[ArrayLike, ArrayLike], FloatArray]
-
-
-def fold_magnitudes(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-    """Return the folds without their signs in degrees, (..., 3); arguments as in `to_folds`."""
-    return np.degrees(np.abs(to_folds(position, rotation)[..., 3:]))
-
-
-def margins_in(unit: Unit) -> ChartQuantity:
-    """Return the margins in a unit of lengths."""
-
-    def values(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-        return unit.factor * margins(position, rotation)
-
-    vertical = axis("margin δ", label_size=18, size=40, space=18)
-    return ChartQuantity("δ{}", vertical, (0.0,), 2, f" {unit.name}", values)
-
-
-FOLDS = ChartQuantity(
-    "|φ{}|",
-    axis("fold |φ| (°)", label_size=18, size=40) | {"splits": (0.0, 90.0, 180.0)},
-    (0.0, 180.0),
-    0,
-    "°",
-    fold_magnitudes,
-)
-
-
-class IncidencePlot:
-    """The chart of a quantity and its legend, empty while there is no path."""
-
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        quantity_in: Callable[[Unit], ChartQuantity],
-        *,
-        has_times: bool = True,
-    ) -> None:
-        self._quantity_in = quantity_in
-        quantity = quantity_in(UNITS)
+    def __init__(self, gui: viser.GuiApi) -> None:
         self._legend = gui.add_html("", visible=False)
         lines = (
-            line(quantity.name.format(index), colour, dash=dash)
+            line(f"δ{index}", colour, dash=dash)
             for index, colour, dash in zip((1, 2, 3), MARGIN_COLOURS, DASHES, strict=True)
         )
         self._chart = TimeChart(
             gui,
             (*lines, dots("singular", ORANGE, 9)),
-            (quantity.vertical, level_axis(quantity.flat, "flat", ORANGE)),
-            INCIDENCE_HEIGHT,
-            has_times=has_times,
+            (
+                axis("margin δ", label_size=18, size=40, space=18),
+                level_axis((0.0,), "flat", ORANGE),
+            ),
+            MARGIN_HEIGHT,
         )
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart and its legend show the frame."""
-        journey, quantity = journey_of(frame.state), self._quantity_in(frame.state.unit)
-        yield from self._chart.show(incidence_columns(journey, quantity), is_visible=True)
-        words = "" if journey is None else legend(journey.pose, quantity)
+        journey, unit = journey_of(frame.state), frame.state.unit
+        yield from self._chart.show(margin_columns(journey, unit), is_visible=True)
+        words = "" if journey is None else legend(journey.pose, unit)
         yield from show_html(self._legend, words)
 
 
-def incidence_columns(journey: Journey | None, quantity: ChartQuantity) -> tuple[NDArray[Any], ...]:
-    """Return the columns of the chart: time, the three values, singular poses, present time."""
+def margin_columns(journey: Journey | None, unit: Unit) -> tuple[NDArray[Any], ...]:
+    """Return the columns of the chart: time, margins in a unit, singular poses, present time."""
     if journey is None:
-        return blank_columns(4, span_of(quantity.flat))
+        return blank_columns(4, span_of(0.0))
     timed, crossings = journey.trajectory, journey.margins.crossings
     poses = [*(crossing.pose for crossing in crossings), journey.pose, journey.pose]
-    values = quantity.of(
+    values = unit.factor * margins(
         np.concatenate([timed.position, [pose.position for pose in poses]]),
         np.concatenate(
             [rotation_from_quaternion(timed.quaternion), [pose.rotation for pose in poses]]
@@ -239,7 +186,7 @@ def incidence_columns(journey: Journey | None, quantity: ChartQuantity) -> tuple
     crossing_times = [crossing_time(journey, index) for index in range(len(crossings))]
     times = np.concatenate([timed.time, crossing_times])
     # Without the present pose: the axis must not change while the path is played.
-    span = span_of(np.append(values[: len(times)], quantity.flat))
+    span = span_of(np.append(values[: len(times)], 0.0))
     return time_columns(times, (*values.T, singular), journey.at, span)
 
 
@@ -256,13 +203,12 @@ def crossing_time(journey: Journey, index: int) -> float:
     return float(np.interp(crossing.move + crossing.share, trajectory.at, trajectory.time))
 
 
-def legend(pose: Pose, quantity: ChartQuantity) -> str:
-    """Return the lines of the chart with the values of a pose, in one line of HTML."""
-    values = quantity.of(pose.position, pose.rotation).tolist()
+def legend(pose: Pose, unit: Unit) -> str:
+    """Return the lines of the chart with the margins of a pose in a unit, in one line of HTML."""
+    values = (unit.factor * margins(pose.position, pose.rotation)).tolist()
     parts = (
         f'<span class="ex-whole" title="{escape(incidence)}">{swatch(colour, look)}'
-        f"{margin_name(index, quantity.name)} "
-        f"<b>{format_decimals(value, quantity.decimals)}{quantity.unit}</b></span>"
+        f"{margin_name(index)} <b>{format_decimals(value, 2)} {unit.name}</b></span>"
         for index, colour, look, incidence, value in zip(
             (1, 2, 3), MARGIN_COLOURS, STROKES, INCIDENCES, values, strict=True
         )
