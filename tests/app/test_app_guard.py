@@ -26,7 +26,6 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.sync.client import ClientConnection
 
-from explorer.app.features.optimise import buttons
 from explorer.app.server import Running, start
 from explorer.app.storage.session_file import encode_session
 from explorer.errors import ServerError
@@ -228,12 +227,12 @@ def test_guard_state_stays_sound_whatever_its_controls_are_given(
 def test_guard_files_go_to_the_tab_that_asks_alone(running: Running) -> None:
     with client_of(running) as client, client_of(running) as other:
         client.read_all_sent(running)
-        client.update(*press_update(running, buttons.DESIGN))
+        client.update(*press_update(running, "export", "Moving page as HTML"))
         mine: list[dict[str, Any]] = []
         while not any(message["type"] == "FileTransferPart" for message in mine):
             mine += client.read()
         content = b"".join(m["content"] for m in mine if m["type"] == "FileTransferPart")
-        assert b'"paper-optimal"' in content
+        assert b"paper-optimal" in content
         kinds = {message["type"] for message in other.read_all_sent(running)}
         assert not any(kind.startswith("FileTransfer") for kind in kinds)
 

@@ -33,9 +33,8 @@ from explorer.app.features.optimise.actions import (
     LiftLimit,
     Revert,
     StartRun,
-    TakePaperBox,
 )
-from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, HULL, LIFT, PAPER, REVERT, START
+from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, LIFT, PAPER, REVERT, START
 from explorer.app.features.optimise.feature import (
     OptimisePanel,
     charted_iterates,
@@ -56,7 +55,6 @@ from explorer.app.features.optimise.words import (
 from explorer.app.features.optimise.work import (
     complete_request,
     find_refusals,
-    is_paper_box_on_offer,
     liftable_limits,
     optimise,
     problem_of,
@@ -243,7 +241,7 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     assert state.pose.quaternion == paper_start().home_pose.quaternion
     assert state.view.workspace.solid
     assert filled_buttons(state) == [ACCEPT]
-    assert {buttons_of(state)[name] for name in (REVERT, START, HULL)} == {"enabled"}
+    assert {buttons_of(state)[name] for name in (REVERT, START)} == {"enabled"}
     assert result_words(state, bench.services.get(BuildVerdict).html()) in bench.markup
     for design in (asked.design, before.design):
         bench.session.do(UNDO)
@@ -350,7 +348,6 @@ def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened
     assert search_notice(after) is None
     assert after.design.variables == best_of(run_of(after)).design.variables
     assert not {ACCEPT, REVERT} & {*buttons_of(after)}
-    assert buttons_of(after)[HULL] == "enabled"
     assert "accepted" in result_words(after)
     record = Optimisation.of(after).record
     assert record is not None
@@ -380,7 +377,6 @@ def test_run_from_an_undecided_result_still_reverts_to_the_own_design() -> None:
         Open(OPTIMAL),
         Reset(),
         LiftLimit("box"),
-        TakePaperBox(),
     ],
 )
 def test_design_cannot_be_changed_while_a_run_goes_on(action: Action) -> None:
@@ -478,15 +474,6 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     after = LiftLimit(limit).apply(before)
     assert limit not in {refusal.limit for refusal in find_refusals(after)}
     assert after.design.home_pose == design.home_pose
-
-
-def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
-    before = ask(SMALL, open_state(INITIAL))
-    after = TakePaperBox().apply(before)
-    assert is_paper_box_on_offer(before)
-    assert find_refusals(before) != ()
-    assert find_refusals(after) == ()
-    assert after.design.home_pose == INITIAL.home_pose
 
 
 def test_limits_in_force_are_listed_and_no_others() -> None:

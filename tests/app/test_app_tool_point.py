@@ -490,7 +490,7 @@ def test_file_of_the_workspace_is_named_after_the_tool(services: Services, desk:
     for at in ("b4", "tool"):
         desk.session.do(Set("view.at", at))
         send_workspace(services, "workspace", "stl", 1)
-        send_workspace(services, "hull", "stl", 1, at_home=True)
+        send_workspace(services, "hull", "stl", 1)
     assert [name.removeprefix(f"{OPTIMAL.name}-") for _, name in downloads.sent] == [
         "workspace.stl",
         "hull.stl",

@@ -313,8 +313,6 @@ def test_files_are_sent_in_the_format_that_is_asked_for(services: Services, desk
     desk.session.do(Set("view.workspace.region", "held"))
     feeds.send_workspace(services, "workspace", "3mf", CLIENT.client_id)
     assert downloads.sent[-1][1] == "paper-optimal-workspace-that-holds-the-load.3mf"
-    feeds.send_workspace(services, "hull", "3mf", CLIENT.client_id, at_home=True)
-    assert downloads.sent[-1][1] == "paper-optimal-hull.3mf"
 
 
 # Under the load of the page, and by the precision of the tool

@@ -25,7 +25,7 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.checks import LONGEST_NAME
 from explorer.optimise import conflicts, defaults
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import MAXIMA, SWING_LIMIT, with_box
+from explorer.optimise.problem import MAXIMA, SWING_LIMIT
 
 SUFFIX = "-optimised"
 LIMIT_NAMES = {SWING_LIMIT: "bounds of the swing"}
@@ -108,18 +108,6 @@ class LiftLimit(Action):
         if design is None:
             raise InputError(f"the design has no limit named {self.limit!r} to lift")
         return replace(state, design=design)
-
-
-@dataclass(frozen=True)
-class TakePaperBox(Action):
-    """Bound the design by the box of the paper's optimum; its home pose stays where it is."""
-
-    template: ClassVar[str] = "Take the paper's box"
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        state.check_free()
-        return replace(state, design=with_box(state.design, conflicts.PAPER_BOX))
 
 
 @dataclass(frozen=True)

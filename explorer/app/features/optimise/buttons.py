@@ -5,27 +5,22 @@ They stand in the markup of its tab, in the palette, and wherever else the page 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
 import viser
 
-from explorer.app.features.designs.feature import send_design
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise import actions, work
 from explorer.app.features.optimise.state import Optimisation
-from explorer.app.features.workspace.feeds import send_workspace
-from explorer.app.session.session import Who
 from explorer.app.state.state import State
 from explorer.app.widgets.chips import StateCommand
-from explorer.optimise.outcome import encode_record
 from explorer.page.widgets.palette import Key, shift
 
 START, CANCEL = "optimise.start", "optimise.cancel"
 ACCEPT, REVERT = "optimise.accept", "optimise.revert"
-PAPER, PAPER_BOX, LIFT = "optimise.paper", "optimise.box", "optimise.lift"
-HULL, DESIGN, RECORD = "optimise.hull", "optimise.design", "optimise.record"
+PAPER, LIFT = "optimise.paper", "optimise.lift"
 
 
 def _is_running(state: State) -> bool:
@@ -35,11 +30,6 @@ def _is_running(state: State) -> bool:
 
 def _is_undecided(state: State) -> bool:
     return Optimisation.of(state).undecided is not None
-
-
-def _has_result(state: State) -> bool:
-    run = Optimisation.of(state).run
-    return run is not None and run.best is not None
 
 
 BUTTONS: Mapping[str, StateCommand] = {
@@ -76,36 +66,11 @@ BUTTONS: Mapping[str, StateCommand] = {
         lambda _: actions.TakePaperProblem(),
         is_ready=lambda state: not Optimisation.of(state).is_on,
     ),
-    PAPER_BOX: StateCommand(
-        "Optimise › Take the paper's box",
-        "Bound b4 by the box of the paper's optimum; one undo brings yours back.",
-        lambda _: actions.TakePaperBox(),
-        is_ready=work.is_paper_box_on_offer,
-    ),
     LIFT: StateCommand(
         "Optimise › Lift the limit",
         "Take the limit that prevents the search out of the design; one undo brings it back.",
         lambda state: actions.LiftLimit(next(iter(work.liftable_limits(state)), "")),
         is_ready=lambda state: bool(work.liftable_limits(state)),
-    ),
-    # A press on one of these sends a file.
-    HULL: StateCommand(
-        "Optimise › Download the hull",
-        "Download the convex hull of the workspace as 3MF; Export has other formats.",
-        lambda _: None,
-        is_ready=_has_result,
-    ),
-    DESIGN: StateCommand(
-        "Optimise › Download the design",
-        "Download the design as a file to open again.",
-        lambda _: None,
-        is_ready=_has_result,
-    ),
-    RECORD: StateCommand(
-        "Optimise › Download the record",
-        "Download the record to repeat the search from.",
-        lambda _: None,
-        is_ready=_has_result,
     ),
 }
 """The buttons by their names."""
@@ -114,27 +79,10 @@ BUTTONS: Mapping[str, StateCommand] = {
 def add_buttons(services: Services) -> None:
     """Register the buttons of the optimiser, and offer them in the palette."""
 
-    def send_record(who: Who) -> None:
-        state = services.session.state
-        record = Optimisation.of(state).record
-        if record is None:
-            services.complain("a search that had to be ended leaves no record", who)
-            return
-        services.downloads.send(who, f"{state.design.name}.record.json", encode_record(record))
-
-    sends: Mapping[str, Callable[[Who], None]] = {
-        HULL: partial(send_workspace, services, "hull", "3mf", at_home=True),
-        DESIGN: partial(send_design, services),
-        RECORD: send_record,
-    }
-
     def press(name: str, value: str, client: viser.ClientHandle) -> None:
-        if name in sends:
-            sends[name](client.client_id)
-        else:
-            is_named = name == LIFT and value
-            change = actions.LiftLimit(value) if is_named else BUTTONS[name].change
-            services.session.do(change, who=client.client_id)
+        is_named = name == LIFT and value
+        change = actions.LiftLimit(value) if is_named else BUTTONS[name].change
+        services.session.do(change, who=client.client_id)
 
     for name, each in BUTTONS.items():
         services.buttons.on(name, partial(press, name))

@@ -13,7 +13,7 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
-from explorer.app.features.feature import Feature, InBar, Services, Tab
+from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
 from explorer.app.features.optimise.actions import SetObjective
 from explorer.app.features.optimise.buttons import ACCEPT, add_buttons, button
 from explorer.app.features.optimise.runner import Optimiser
@@ -23,6 +23,7 @@ from explorer.app.features.optimise.work import complete_request
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
+from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -32,7 +33,13 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import Unit, format_number
-from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
+from explorer.optimise.outcome import (
+    OBJECTIVE_SYMBOLS,
+    Curve,
+    Iterate,
+    curves_of,
+    encode_record,
+)
 from explorer.optimise.problem import YAW, ObjectiveName, Problem
 from explorer.page.widgets.assigning import Update
 
@@ -248,10 +255,27 @@ def search_chip(frame: Frame) -> str:
     return activity(TAB, notice.title, notice.text, notice.share, buttons)
 
 
+def send_record(services: Services, _: str, who: Who) -> None:
+    """Send the record of the search that ended last."""
+    state = services.session.latest_state()
+    record = Optimisation.of(state).record
+    if record is not None:
+        services.downloads.send(who, f"{state.design.name}.record.json", encode_record(record))
+
+
 OPTIMISE = Feature(
     "optimise",
     manual="optimise.md#On the page",
     tabs=(Tab("work", "Optimise", OptimisePanel, viser.Icon.SPARKLES),),
     bar=(InBar("right", lambda _: search_chip),),
+    exports=(
+        FileExport(
+            "Record of the search",
+            "What repeats the last search of the tab Optimise, and tells its course in a report.",
+            ("JSON",),
+            send_record,
+            lambda services: Optimisation.of(services.session.state).record is not None,
+        ),
+    ),
     runners=(Optimiser,),
 )

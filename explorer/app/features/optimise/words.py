@@ -118,8 +118,6 @@ def result_words(state: State, built: str = "") -> str:
         )
         for limit in limits
     )
-    if work.is_paper_box_on_offer(state):
-        remedies += buttons.button(buttons.PAPER_BOX, state)
     undecided = Optimisation.of(state).undecided
     is_success = undecided is not None and undecided.has_converged
     verdict = "" if run is None or run.verdict is None else verdict_words(state, run, run.verdict)
@@ -140,7 +138,7 @@ def result_words(state: State, built: str = "") -> str:
     found = ""
     if run is not None and has_result:
         compared = comparison_table(run, state.view)
-        found = f'<div class="ex-after">{built}</div>{_downloads(state)}{compared}'
+        found = f'<div class="ex-after">{built}</div>{compared}'
     return markup.box(
         verdict,
         refused_words(why, refusals, limits) if refusals else "",
@@ -158,13 +156,6 @@ def refused_words(body: str, refusals: Sequence[Conflict], limits: Sequence[str]
     is_problem = not any(refusal.limit in NO_PROBLEM for refusal in refusals)
     title = "No design can keep these demands" if is_problem else "This cannot be optimised"
     return markup.alert(title, body)
-
-
-def _downloads(state: State) -> str:
-    """Return the buttons that download the result, as HTML."""
-    files = ((buttons.HULL, "Hull"), (buttons.DESIGN, "Design"), (buttons.RECORD, "Record"))
-    sends = "".join(buttons.button(name, state, words=words) for name, words in files)
-    return f'<div class="ex-flow ex-before"><span class="ex-dim">Download</span>{sends}</div>'
 
 
 def verdict_words(state: State, run: SearchRun, verdict: SearchResult) -> str:

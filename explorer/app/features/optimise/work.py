@@ -89,15 +89,6 @@ def liftable_limits(state: State) -> tuple[str, ...]:
     )
 
 
-def is_paper_box_on_offer(state: State) -> bool:
-    """Return whether the box of the paper's optimum may do in place of one that is too small."""
-    if conflicts.BOX_LIMIT not in liftable_limits(state):
-        return False
-    boxed = problems.with_box(state.design, conflicts.PAPER_BOX)
-    left = _find_refusals(boxed, complete_request(state), state.unit)
-    return boxed != state.design and all(each.limit != conflicts.BOX_LIMIT for each in left)
-
-
 @lru_cache(maxsize=8)
 def _default_volume(design: Design, objective: problems.ObjectiveName) -> float:
     """Return the next larger round volume to match; else that of a design, to six digits."""

@@ -153,18 +153,11 @@ FORMATS = (*HULL_FORMATS, work.STEP)
 Exported = Literal["workspace", "hull"]
 
 
-def send_workspace(
-    services: Services, what: Exported, file_format: str, who: Who, *, at_home: bool = False
-) -> None:
-    """Send a client a file of the workspace that is shown, or of its hull, in one of `FORMATS`.
-
-    If it is `at_home`, it is that within the limits at the orientation of home instead.
-    """
+def send_workspace(services: Services, what: Exported, file_format: str, who: Who) -> None:
+    """Send a client a file of the workspace that is shown, or of its hull, in one of `FORMATS`."""
     state = services.session.latest_state()
     frame, region = Frame(state), state.view.workspace.region
     rows = workspace_rows(frame)
-    if at_home:
-        region, rows = "limits", work.rows_of(state.design.home_pose.rotation)
     start = workspace_start(frame) if region == "accessible" else None
     design, load = state.design, NO_LOAD
     if region == "held":
