@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NoReturn
 from unittest.mock import Mock
 
 import pytest
@@ -15,7 +15,6 @@ from client import Client, client_of, press_update, presses_in, wait_for
 from services import StubJobs
 
 from explorer.app.features.designs.feature import UNSAVED
-from explorer.app.features.sharing.feature import send_picture
 from explorer.app.server import Running, start
 from explorer.app.session.session import move_to
 from explorer.app.state.moves import SetPosition
@@ -23,6 +22,7 @@ from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.downloads import Downloads
+from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 
 
@@ -104,18 +104,18 @@ def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Pat
             assert len(notices_until(other, "the next study has ended")) == 1
 
 
-def test_picture_of_an_impossible_size_is_refused_to_the_tab_that_asks_alone(
-    tmp_path: Path,
-) -> None:
+def test_file_that_cannot_be_drawn_is_refused_to_the_tab_that_asks_alone(tmp_path: Path) -> None:
+    def refuse(_: object) -> NoReturn:
+        raise InputError("the scene is too large")
+
     with (
         explorer_with(data_in(tmp_path)) as running,
         client_of(running) as client,
         client_of(running) as other,
     ):
-        send_picture(running.page.services, (9, 100), client.client_id)
-        refused = notices_until(client, "got 9")[-1]["body"]
-        assert "the width of a picture is 16 to 4,096 pixels; got 9" in refused
-        assert "got 9" not in str(other.read_all_sent(running))
+        running.page.services.downloads.make(client.client_id, "Drawing", refuse)
+        assert notices_until(client, "too large")[-1]["body"] == "the scene is too large"
+        assert "too large" not in str(other.read_all_sent(running))
 
 
 def encoded(what: str) -> bytes:

@@ -235,23 +235,11 @@ def test_range_or_turn_beyond_half_a_turn_is_refused(changes: dict[str, Any], wo
         show(open_state(OPTIMAL), **changes)
 
 
-def test_strip_of_torsions_has_the_tilts_and_a_mark_at_the_torsion(
-    by_torsion: TiltByTorsion,
-) -> None:
-    markup = maps.torsion_strip(by_torsion, -90.0, 0.0)
-    assert facts_of(markup, "torsions")["tilts"] == [
-        None if np.isnan(tilt) else pytest.approx(tilt, abs=0.05) for tilt in by_torsion.tilts
-    ]
-    assert f'class="here" d="M{0.75 * maps.LEFT + 0.25 * maps.RIGHT:.1f} ' in markup
+def test_best_torsion_is_told_beside_the_present_one(by_torsion: TiltByTorsion) -> None:
     best = by_torsion.best
-    for tilt, count in ((best.tilt - 0.06, 1), (best.tilt - 0.04, 0), (np.nan, 1)):
-        assert maps.torsion_strip(by_torsion, 0.0, tilt).count('class="dot"') == count
     assert best_words(best, best.tilt).endswith(", as here")
     assert "at" in best_words(best, best.tilt - 1.0).split()
-    nowhere = tilt_by_torsion(OPTIMAL, (30.0, 5.0, 9.0))
-    empty = maps.torsion_strip(nowhere, 0.0, np.nan)
-    assert not {"nan", "curve", "possible", "dot"} & {*re.findall(r"\w+", empty)}
-    assert best_words(nowhere.best, np.nan) == "none"
+    assert best_words(tilt_by_torsion(OPTIMAL, (30.0, 5.0, 9.0)).best, np.nan) == "none"
 
 
 def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> None:

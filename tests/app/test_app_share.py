@@ -11,15 +11,13 @@ from unittest.mock import Mock
 
 import msgspec
 import numpy as np
-import pytest
 import zstandard
 
 from explorer.app.features.sharing.scene_files import (
-    LEAST,
     MOST,
     FileCamera,
     caption_of,
-    picture_size,
+    double_size,
     scene_html,
     visible_messages,
 )
@@ -27,7 +25,6 @@ from explorer.app.server import Running
 from explorer.app.state.actions import Set
 from explorer.app.state.state import open_state
 from explorer.app.state.view import View
-from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -137,12 +134,11 @@ def test_caption_of_a_scene_page_has_names_as_text() -> None:
     assert "1 unit = 10 mm" in caption
 
 
-@pytest.mark.parametrize(
-    ("width", "height", "named"),
-    [(15, 100, "width"), (100, 4097, "height"), (float("nan"), 100, "width"), (64, -1, "height")],
-)
-def test_picture_size_out_of_bounds_is_refused(width: float, height: float, named: str) -> None:
-    with pytest.raises(InputError, match=rf"^the {named} of a picture is 16 to 4,096 pixels; got"):
-        picture_size(Mock(), (width, height))
-    assert picture_size(Mock(), (LEAST, MOST)) == (LEAST, MOST)
-    assert picture_size(Mock(), (99.6, 100.2)) == (100, 100)
+def test_picture_twice_as_shown_is_within_what_browsers_draw() -> None:
+    def size(width: int, height: int) -> tuple[int, int]:
+        camera = Mock(image_width=width, image_height=height)
+        return double_size(Mock(camera=camera))
+
+    assert size(640, 480) == (1280, 960)
+    assert size(4096, 1024) == (MOST, 1024)
+    assert size(3000, 1500) == (MOST, MOST // 2)

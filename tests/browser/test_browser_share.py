@@ -59,14 +59,6 @@ def pixels_of(download: Download) -> NDArray[np.uint8]:
     return untyped.imread(download.path().read_bytes(), extension=".png")
 
 
-def take_picture(tab: Tab, *, transparent: bool) -> NDArray[np.uint8]:
-    tab.switch("Transparent", on=transparent)
-    with tab.drawing(), tab.page.expect_download() as download:
-        tab.push("Download picture")
-    assert download.value.suggested_filename.startswith("paper-optimal-")
-    return pixels_of(download.value)
-
-
 def reds(pixels: NDArray[Any]) -> int:
     """Return how many pixels are as red as nothing but the handle is, and the axes in a corner."""
     pixels = pixels[: pixels.shape[0] * 3 // 4]
@@ -74,18 +66,14 @@ def reds(pixels: NDArray[Any]) -> int:
     return int(((red > 200) & (green < 60) & (blue < 160)).sum())
 
 
-def test_picture_has_the_size_and_background_that_are_set_and_no_handle(tab: Tab) -> None:
-    tab.open_dialog("Export")
-    tab.settle()
-    tab.page.get_by_text("Picture of another size").click()
-    tab.type("Width (px)", "320")
-    tab.type("Height (px)", "240")
-    tab.page.keyboard.press("Tab")
-    opaque = take_picture(tab, transparent=False)
-    assert opaque.shape == (240, 320, 3)
+def test_picture_has_the_size_and_background_that_are_asked_for_and_no_handle(tab: Tab) -> None:
+    height, width = (2 * side for side in decoded(tab.picture()).shape[:2])
+    with tab.drawing():
+        opaque = pixels_of(tab.export("Picture", "PNG twice as shown"))
+        clear = pixels_of(tab.export("Picture", "PNG transparent"))
+    assert opaque.shape == (height, width, 3)
     assert (opaque[0, 0] > 240).all()
-    clear = take_picture(tab, transparent=True)
-    assert clear.shape == (240, 320, 4)
+    assert clear.shape == (height, width, 4)
     assert clear[..., 3].min() == 0
     assert clear[..., 3].max() == 255
     # On white, the one is the other.

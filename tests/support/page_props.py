@@ -16,8 +16,6 @@ from explorer.app.server import Running
 # Orders are counted over all of a process; browsers turn these without being asked.
 PASSING = {"order", "_order", "_tab_container_ids"}
 
-# Choices for the next file; they are no part of the state and kept nowhere.
-OF_THE_MOMENT = {"Width (px)", "Height (px)", "Transparent"}
 # The track of a slider holds still while it is moved, so that it depends on what was done.
 OF_TRACKS = {"min", "max", "_marks"}
 ROUNDING = 1e-9
@@ -97,8 +95,6 @@ def _handles(container: Any, place: str) -> Iterator[tuple[str, Any]]:
 def _properties(place: str, handle: Any) -> dict[str, object]:
     state = handle._impl
     found: dict[str, object] = {}
-    if getattr(state.props, "label", None) in OF_THE_MOMENT:
-        return found
     props = state.props
     is_slider = isinstance(handle, viser.GuiSliderHandle | viser.GuiMultiSliderHandle)
     if dataclasses.is_dataclass(props):

@@ -1,7 +1,6 @@
-// Reads the charts of orientations under the pointer; a click turns the platform there, as a press
-// of the button that the chart names: the polar map of tilts, and the tilt by torsion.
+// Reads the polar map of tilts under the pointer; a click tilts the platform there.
 window.explorer.tilts ??= (() => {
-  const CHART = "[data-tilts], [data-torsions]";
+  const CHART = "[data-tilts]";
   const chartAt = (target) => target.closest?.(CHART) ?? null;
   const rounded = (angle) => Number(angle.toFixed(1));
   const text = (angle) => `${angle.toFixed(1)}°`.replace("-", "\u2212");
@@ -15,28 +14,11 @@ window.explorer.tilts ??= (() => {
     const tilt = (edge * Math.hypot(x, y)) / radius;
     if (tilt > edge) return null;
     const angles = [(Math.atan2(y, x) * 180) / Math.PI, tilt].map(rounded);
-    return {
-      value: angles,
-      words: `azimuth ${text(angles[0])}, tilt ${text(angles[1])}`,
-      button: "orientation.go",
-    };
-  };
-  const torsionAt = (chart, at) => {
-    const { left, right, tilts } = JSON.parse(chart.dataset.torsions);
-    const share = (at.x - left) / (right - left);
-    if (share < 0 || share > 1) return null;
-    const torsion = rounded(360 * share - 180);
-    const tilt = tilts[Math.round(share * tilts.length) % tilts.length];
-    const most = tilt === null ? "none" : text(tilt);
-    return {
-      value: torsion,
-      words: `torsion ${text(torsion)}, tilt ${most}`,
-      button: "orientation.torsion",
-    };
+    return { angles, words: `azimuth ${text(angles[0])}, tilt ${text(angles[1])}` };
   };
   const read = (chart, event) => {
     const at = pointIn(chart, event);
-    return at && (chart.dataset.tilts ? tiltAt(chart, at) : torsionAt(chart, at));
+    return at && tiltAt(chart, at);
   };
   let last = null;
   const show = () => {
@@ -56,13 +38,13 @@ window.explorer.tilts ??= (() => {
     const target = document.elementFromPoint(last.clientX, last.clientY);
     last = target && chartAt(target) ? { ...last, target } : null;
     show();
-  }).observe(document.body, { ...CHANGES, attributeFilter: ["data-tilts", "data-torsions"] });
+  }).observe(document.body, { ...CHANGES, attributeFilter: ["data-tilts"] });
   addEventListener("click", (event) => {
     const chart = chartAt(event.target),
       // A click tells whole pixels, other than the pointer that read the same chart.
       isRead = last && chartAt(last.target) === chart,
       found = chart && read(chart, isRead ? last : event);
-    if (found) window.explorer.press(found.button, JSON.stringify(found.value));
+    if (found) window.explorer.press("orientation.go", JSON.stringify(found.angles));
   });
   return { read };
 })();

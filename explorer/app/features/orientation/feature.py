@@ -65,7 +65,6 @@ LEVEL = 1e-6
 
 _Turn = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
 _TILT = msgspec.json.Decoder(tuple[_Turn, Annotated[float, msgspec.Meta(ge=0.0, le=180.0)]])
-_TORSION = msgspec.json.Decoder(_Turn)
 
 
 class OrientationPanel:
@@ -87,7 +86,6 @@ class OrientationPanel:
                 SPANS[axis],
                 disabled=None if axis else lambda state: state.tilt_torsion.tilt < LEVEL,
             )
-        self._strip = gui.add_html("")
         with gui.add_folder("Over the workspace"):
             controls.checkbox(
                 "Greatest tilts",
@@ -123,7 +121,6 @@ class OrientationPanel:
             )
             self._volume = gui.add_html("", visible=False)
         services.do_on_press("orientation.go", _tilt)
-        services.do_on_press("orientation.torsion", _turn)
         run_script(services.server, read_script("tilts"))
 
     def updates(self, frame: Frame) -> Updates:
@@ -139,11 +136,6 @@ class OrientationPanel:
         title = caption("What ends the tilts, by share of azimuths")
         yield self._legend, "content", box(title, maps.legend(tilts))
         yield from self._controls.updates(frame)
-        strip = ""
-        if self._here.drawing is not None:
-            strip = maps.torsion_strip(self._here.drawing.by_torsion, here.torsion, least.tilt)
-            strip = box(f'<div class="{look_of(self._here)}">{strip}</div>')
-        yield from show_html(self._strip, strip)
         yield from self._tilts_under_way.updates()
         view = frame.state.view.orientation
         title, button = "The tilts could not be computed", "Compute the tilts"
@@ -158,12 +150,6 @@ def _tilt(text: str) -> Action | None:
     """Return the action that tilts the platform as a page sent it, (azimuth, tilt) in degrees."""
     angles: tuple[float, float] | None = decode_text(text, _TILT)
     return None if angles is None else work.GoToTilt(*angles)
-
-
-def _turn(text: str) -> Action | None:
-    """Return the action that turns the platform to a torsion that a page sent, in degrees."""
-    torsion: float | None = decode_text(text, _TORSION)
-    return None if torsion is None else work.SetTiltTorsion(2, torsion)
 
 
 def _has_range(state: State) -> bool:

@@ -1,11 +1,11 @@
-"""The map of tilts by azimuth, the strip of tilts by torsion, and the scale of tilts."""
+"""The map of tilts by azimuth, and the scale of tilts."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from html import escape
 from xml.etree.ElementTree import Element
 
@@ -20,7 +20,7 @@ from explorer.mechanism.rgb import Rgb, css
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import MARGIN_COLOURS
-from explorer.workspace.orientations.tilts import GreatestTilt, TiltByTorsion, TiltMap
+from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap
 
 WIDTH, HEIGHT = 316.0, 268.0
 CENTRE, RADIUS = (158.0, 134.0), 112.0
@@ -50,10 +50,6 @@ COLOURS: dict[str, Rgb] = {
 OTHER: Rgb = (120, 70, 40)
 """Colour of other limits, such as those of swings."""
 
-# The strip, in pixels.
-STRIP_HEIGHT = 96.0
-LEFT, RIGHT, TOP, BOTTOM = 34.0, 306.0, 8.0, 72.0
-TICKS = (-180, -90, 0, 90, 180)
 # Difference of tilts in degrees below which they count as one.
 SAME_TILT = 0.05
 
@@ -62,14 +58,6 @@ STOPS: tuple[Rgb, ...] = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 
 
 # The end of the scale is a multiple of this, in degrees.
 ROUND = 10.0
-
-
-def _chart(label: str, facts: Mapping[str, object], pieces: Iterable[Element], kind: str) -> str:
-    """Return a chart as SVG, with facts of its kind, "tilts" or "torsions", for a script."""
-    height = HEIGHT if kind == "tilts" else STRIP_HEIGHT
-    data = {f"data-{kind}": msgspec.json.encode(facts).decode()}
-    box = f"0 0 {WIDTH:g} {height:g}"
-    return page_picture("ex-map ex-tilts", label, *pieces, viewBox=box, **data)
 
 
 def _round_up(tilt: float) -> float:
@@ -107,7 +95,13 @@ def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: Tilt
     pieces += (_path(look, arms) for look in ("cross casing", "cross"))
     key = f"+ present orientation, ○ home{', at another torsion' if is_other else ''}"
     return (
-        _chart("Greatest tilt by azimuth", facts, pieces, "tilts")
+        page_picture(
+            "ex-map ex-tilts",
+            "Greatest tilt by azimuth",
+            *pieces,
+            viewBox=f"0 0 {WIDTH:g} {HEIGHT:g}",
+            data_tilts=msgspec.json.encode(facts).decode(),
+        )
         + f'<div class="ex-dim">{key}</div>'
         + reading("Point at the map to read it, click to tilt there.")
     )
@@ -179,61 +173,6 @@ def _region(tilts: TiltMap, edge: float) -> Iterator[Element]:
     for limit, group in itertools.groupby(range(len(points)), lambda k: tilts.limits[k]):
         border = path_of(parts[[*group]].reshape(-1, 2), "", 1)
         yield element("path", class_="border", stroke=css(colour_of(limit)), d=border)
-
-
-def torsion_strip(by_torsion: TiltByTorsion, torsion: float, tilt: float) -> str:
-    """Return the tilt by torsion as SVG, with marks at the present and the best torsion.
-
-    The best torsion is marked only where it allows a larger tilt than the present one, at which
-    the greatest tilt in every azimuth is `tilt`, NaN where none is possible. Angles in degrees.
-    """
-    best = by_torsion.best
-    largest = 0.0 if math.isnan(best.tilt) else best.tilt
-    top = max(RING, _round_up(largest))
-    tilts = [round(t, 1) if math.isfinite(t) else None for t in by_torsion.tilts.tolist()]
-    facts = {"left": LEFT, "right": RIGHT, "tilts": tilts}
-    pieces = [*_axes(top), *_area(by_torsion.torsions, tilts, top)]
-    pieces.append(_path("here", f"M{_across(torsion):.1f} {TOP}V{BOTTOM}"))
-    if not math.isnan(best.tilt) and not best.tilt - tilt <= SAME_TILT:
-        at = _across(math.remainder(best.torsion, 360.0)), _up(best.tilt, top)
-        pieces.append(circle(at, 3.0, "dot"))
-    return (
-        caption("Greatest tilt in every azimuth by torsion")
-        + _chart("Greatest tilt by torsion", facts, pieces, "torsions")
-        + reading("Click to turn the platform to a torsion.")
-    )
-
-
-def _across(torsion: float) -> float:
-    return LEFT + (RIGHT - LEFT) * ((torsion + 180.0) / 360.0)
-
-
-def _up(tilt: float, top: float) -> float:
-    return BOTTOM - (BOTTOM - TOP) * tilt / top
-
-
-def _axes(top: float) -> Iterator[Element]:
-    """Yield the frame and its labels."""
-    yield _path("frame", f"M{LEFT} {TOP}V{BOTTOM}H{RIGHT}V{TOP}")
-    for tilt in (0.0, top):
-        yield drawing_text(f"{tilt:g}°", LEFT - 5.0, _up(tilt, top) + 4.0, "angle", anchor="end")
-    for tick in TICKS:
-        x, words = _across(tick), f"{tick}°".replace("-", "−")
-        anchor = "end" if tick == TICKS[-1] else "middle"
-        yield drawing_text(words, x, BOTTOM + 15.0, "angle", anchor=anchor)
-        yield _path("ring", f"M{x:.1f} {TOP}V{BOTTOM}")
-
-
-def _area(torsions: FloatArray, tilts: list[float | None], top: float) -> Iterator[Element]:
-    """Yield the tilts as an area, with a gap where no tilt is possible."""
-    ends = zip([*torsions.tolist(), 180.0], [*tilts, tilts[0]], strict=True)
-    for is_possible, group in itertools.groupby(ends, lambda end: end[1] is not None):
-        if not is_possible:
-            continue
-        points = [(_across(torsion), _up(tilt or 0.0, top)) for torsion, tilt in group]
-        corners = ((points[0][0], BOTTOM), *points, (points[-1][0], BOTTOM))
-        yield _path("possible", path_of(np.array(corners), decimals=1))
-        yield _path("curve", path_of(np.array(points), "", 1))
 
 
 def most_of(drawing: TiltsDrawing) -> float:

@@ -34,12 +34,13 @@ from explorer.mechanism.design import Design
 from explorer.page.widgets.assigning import Update
 
 PRESS = "export"
-PICTURES: dict[str, tuple[int, int] | float] = {
-    "PNG 1920 × 1080": (1920, 1080),
-    "PNG 3840 × 2160": (3840, 2160),
-    "PNG twice as shown": 2.0,
+PICTURES = {
+    "PNG 1920 × 1080": ((1920, 1080), False),
+    "PNG 3840 × 2160": ((3840, 2160), False),
+    "PNG twice as shown": (None, False),
+    "PNG transparent": (None, True),
 }
-"""Formats of pictures: width and height, or a factor on the size in the browser."""
+"""Formats of pictures: width and height, None for twice those in the browser; if transparent."""
 FIGURES = {
     f"SVG {width:g} mm{', black' if black else ''}": (width, black)
     for black in (False, True)
@@ -53,16 +54,12 @@ EXTRA_OF_FORMAT = {"STEP": "cad", "PDF": "screenshot"}
 BACKGROUNDS = {False: (255, 255, 255), True: (20, 20, 20)}
 
 
-def send_picture(
-    services: Services, size: tuple[float, float] | float, who: Who, *, transparent: bool = False
-) -> None:
-    """Send the view of a browser as PNG, drawn by that browser.
-
-    The size is width and height in pixels, or a factor on the size in the browser.
-    """
+def send_picture(services: Services, name: str, who: Who) -> None:
+    """Send the view of a browser as PNG in one of `PICTURES`, drawn by that browser."""
+    size, transparent = PICTURES[name]
 
     def make(client: viser.ClientHandle) -> File:
-        sides = scene_files.picture_size(client, size)
+        sides = size or scene_files.double_size(client)
         background = None if transparent else BACKGROUNDS[services.theme.is_dark_for(who)]
         data = scene_files.view_picture(client, sides, background)
         return f"{services.session.state.design.name}-{sides[0]}x{sides[1]}.png", data
@@ -131,7 +128,7 @@ def sender_of(
 
 
 class ExportDialog:
-    """Whether the machine can be built; a row for each thing; then pictures of any size."""
+    """Whether the machine can be built, and a row for each thing."""
 
     def __init__(self, services: Services) -> None:
         gui, buttons = services.gui, services.buttons
@@ -149,30 +146,6 @@ class ExportDialog:
         buttons.on(PRESS, lambda value, client: sends[value](client.client_id), values=sends)
         self._verdict, self._built = services.get(BuildVerdict), gui.add_html("")
         self._services, self._list = services, gui.add_html("")
-        with gui.add_folder("Picture of another size", expand_by_default=False):
-            least, most = scene_files.LEAST, scene_files.MOST
-            hint = f"{least} to {most} pixels."
-            sides = [
-                gui.add_number(f"{side} (px)", pixels, min=least, max=most, step=1, hint=hint)
-                for side, pixels in (("Width", 1600), ("Height", 1200))
-            ]
-            hint = "Leave out the background."
-            transparent = gui.add_checkbox("Transparent", initial_value=False, hint=hint)
-            button = gui.add_button(
-                "Download picture",
-                icon=viser.Icon.PHOTO,
-                hint="PNG of the scene with its labels, from your camera.",
-            )
-
-        def send(who: Who) -> None:
-            size = sides[0].value, sides[1].value
-            send_picture(services, size, who, transparent=transparent.value)
-
-        button.on_click(lambda event: send(event.client_id))
-        services.commands.offer(
-            transparent, lambda _: setattr(transparent, "value", not transparent.value)
-        )
-        services.commands.offer(button, lambda client: send(client.client_id))
 
     def updates(self, _: Frame) -> Iterator[Update]:
         """Yield the updates that show whether the machine can be built, and what there is now."""
@@ -228,7 +201,7 @@ SHARING = Feature(
             "Picture",
             "The scene with its labels, from your camera.",
             tuple(PICTURES),
-            lambda services, name, who: send_picture(services, PICTURES[name], who),
+            send_picture,
         ),
         FileExport(
             "Figure",

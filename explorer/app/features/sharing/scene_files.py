@@ -1,4 +1,4 @@
-"""The scene as files: one HTML page to turn and zoom, and pictures of any size.
+"""The scene as files: one HTML page to turn and zoom, and pictures.
 
 The page opens without the explorer. It holds viser's page and the visible scene, without the panels
 and the drag handle; its content security policy keeps it from fetching anything. A picture is drawn
@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from explorer.app.features.mechanism.marks import HANDLE_NAME
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.errors import InputError, NoAnswerError
+from explorer.errors import NoAnswerError
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_apart, format_decimals, format_number
+from explorer.numerics.number_text import format_decimals, format_number
 from explorer.page.browser.viser_gaps import SceneMessage, scene_as_html
 from explorer.page.look import read_script
 
@@ -142,36 +142,20 @@ def caption_of(state: State, date: dt.date) -> str:
     )
 
 
-LEAST, MOST = 16, 4096
-"""The bounds of width and height, in pixels; some browsers draw larger pictures only in part."""
-
 # A software renderer takes many seconds for the largest picture.
 PATIENCE_SECONDS = 90.0
+# Most pixels of a side; some browsers draw larger pictures only in part.
+MOST = 4096
 # Widest angle of view, for pictures much higher than wide, in radians.
 WIDEST = math.radians(150.0)
 
 
-def picture_size(client: viser.ClientHandle, size: tuple[float, float] | float) -> tuple[int, int]:
-    """Return width and height of a picture in whole pixels.
-
-    Args:
-        client: The browser.
-        size: Width and height, or a factor on the size of the scene in the browser, which yields a
-            size within the bounds.
-
-    Raises:
-        InputError: A side that is out of bounds, or no number.
-    """
-    if not isinstance(size, tuple):
-        sides = (client.camera.image_width, client.camera.image_height)
-        factor = min(size, MOST / max(sides))
-        width, height = (max(round(factor * side), LEAST) for side in sides)
-        return width, height
-    for name, value in zip(("width", "height"), size, strict=True):
-        if not (math.isfinite(value) and LEAST <= value <= MOST):
-            least, most, got = format_apart((LEAST, MOST, value), 4, format_number)
-            raise InputError(f"the {name} of a picture is {least} to {most} pixels; got {got}")
-    return round(size[0]), round(size[1])
+def double_size(client: viser.ClientHandle) -> tuple[int, int]:
+    """Return twice the width and height of the scene in a browser, within `MOST`, in pixels."""
+    sides = (client.camera.image_width, client.camera.image_height)
+    factor = min(2.0, MOST / max(sides))
+    width, height = (max(round(factor * side), 1) for side in sides)
+    return width, height
 
 
 def view_picture(
