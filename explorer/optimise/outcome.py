@@ -32,9 +32,8 @@ all demands. Stalled: the demands are met, but no step improves the objective al
 conditions of an optimum fail. Outdone: even without the clearance demanded, the best design is no
 better than that of an earlier start. Cancelled: `stop` ended the search."""
 
-Phase = Literal["opening", "growing", "solving"]
-"""Opening: searching a design whose workspace is not empty. Growing: enlarging the workspace,
-since the volume was out of reach. Solving: the problem itself."""
+Phase = Literal["growing", "solving"]
+"""Growing: enlarging the workspace, since the volume was out of reach. Solving: the problem."""
 
 
 class IterateRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

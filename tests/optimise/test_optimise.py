@@ -268,19 +268,7 @@ def test_demand_about_what_the_objective_improves_is_kept_too(
 # Empty workspaces
 
 
-def test_search_from_empty_workspace_opens_it_first() -> None:
-    box = ((14.0, 14.0, 14.0), (20.0, 20.0, 20.0))
-    start = limited(PRESETS["paper-initial"], box=box)
-    assert workspace_volume(start).volume == 0.0
-    problem = make_problem(start, "match-volume", volume=100.0)
-    outcome = optimise_design(problem)
-    assert_is_sound(outcome)
-    assert outcome.converged
-    assert {each.phase for each in outcome.history} == {"opening", "solving"}
-    assert outcome.history[0].worst
-
-
-def test_search_that_cannot_open_the_workspace_names_what_empties_it() -> None:
+def test_search_from_an_empty_workspace_names_what_empties_it() -> None:
     outcome = optimise_design(make_problem(EMPTY, "match-volume", volume=10.0))
     assert outcome.status == "infeasible"
     assert "empty because of" in outcome.message

@@ -53,7 +53,7 @@ def random_problem(seed: int) -> Problem:
 @pytest.mark.parametrize("seed", long_after(4, SEEDS))
 def test_clearance_of_a_search_that_has_converged_is_missed_by_no_position(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    outcome = optimise_design(random_problem(seed), iterations=80)
+    outcome = optimise_design(random_problem(seed), iterations=120)
     assert outcome.converged
     design, demands = outcome.design, outcome.problem.demands
     rotation = design.home_pose.rotation

@@ -118,7 +118,7 @@ class ClearanceDemand:
         rows = np.flatnonzero(by_leaving.max(axis=1) > WEIGHT)
         for limit, far in zip(limits, outside, strict=True):
             shares = by_leaving[rows] * np.exp(sharp * far[rows] - out[rows])[:, None]
-            gradients -= shares.T @ state.slack(limit, p[rows])[1]
+            gradients -= shares.T @ state.slack_slopes(limit, p[rows])
         return Measured(least / sharp / self.clearance - RESERVE, gradients / self.clearance)
 
     def worst(self, state: SearchState) -> tuple[float, str]:

@@ -31,14 +31,12 @@ from explorer.optimise.search.clearance_demand import UnprovenClearance
 from explorer.optimise.search.demands import MET
 from explorer.optimise.search.model import Evaluation, SearchModel, reported_objective
 from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimality, solve
-from explorer.optimise.search.starts import open_workspace, promising_starts
+from explorer.optimise.search.starts import promising_starts
 from explorer.optimise.search.state import SearchState, scales
 from explorer.workspace.slices.volume import emptying_limits, unexplained_volume
 
 # Largest F = |1 − V/V′| of a matched volume.
 MATCHED = 1e-10
-# A workspace below this share of the demanded volume is opened first.
-OPEN = 0.01
 # Number of times that an attempt continues, with more positions at which the clearance is demanded
 # or once the volume is reached.
 ROUNDS = 30
@@ -127,38 +125,24 @@ class Search:
         """Search from some values; if it is relaxed, the clearance is only looked at in the end."""
         problem, trail = self.problem, self.trail
         trail.begin()
+        here = SearchState(problem, np.array(values) / scales(problem))
         try:
             trail.before_each()
-            u = np.array(values) / scales(problem)
-            if self._is_closed(u):
-                nearby = open_workspace(problem, u, see=self._see_opening)
-                if nearby is None:
-                    because = emptying_limits(SearchState(problem, u).workspace)
-                    words = (
-                        f"the workspace is empty because of {', '.join(because)}, and no "
-                        "design nearby opens it"
-                    )
-                    return Attempt("infeasible", because[0] if because else "", words, trail.best)
-                values = (nearby * scales(problem)).tolist()
+            if here.volume <= 0.0:
+                because = emptying_limits(here.workspace)
+                trail.add(here, "solving", because[0] if because else "", -1.0)
+                words = (
+                    f"the workspace is empty because of {', '.join(because)}: start from a design "
+                    "that has one"
+                )
+                return Attempt("infeasible", trail.best.worst, words, trail.best)
             return self._solve(
                 SearchModel(problem, values, trail.before_each, is_relaxed=is_relaxed)
             )
         except Stop:
             if not trail.history:
-                trail.see_opening(SearchState(problem, np.array(values) / scales(problem)), "")
+                trail.add(here, "solving", "", 0.0 if here.volume > 0.0 else -1.0)
             return Attempt("cancelled", "", "", trail.best)
-
-    def _is_closed(self, u: FloatArray) -> bool:
-        """Whether the workspace must be opened first."""
-        demanded = self.problem.demands.volume or self.problem.size**3
-        return SearchState(self.problem, u).volume < OPEN * demanded
-
-    def _see_opening(self, state: SearchState, worst: str) -> None:
-        self.trail.before_each()
-        self.steps += 1
-        self.evaluations += 1
-        self.steps_left -= 1
-        self.trail.see_opening(state, worst)
 
     def _solve(self, model: SearchModel) -> Attempt:
         at, has_grown, is_done = model.at(model.start), False, False

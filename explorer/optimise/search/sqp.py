@@ -169,13 +169,10 @@ class Trail:
     def see(self, model: SearchModel, at: Evaluation, phase: Phase) -> None:
         """Record an iterate of the solver."""
         spare, worst = model.worst_of_all(at)
-        self._add(at.state, phase, worst, spare)
+        self.add(at.state, phase, worst, spare)
 
-    def see_opening(self, state: SearchState, worst: str) -> None:
-        """Record an iterate on the way to a workspace that is not empty."""
-        self._add(state, "opening", worst, 0.0 if state.volume > 0.0 else -1.0)
-
-    def _add(self, state: SearchState, phase: Phase, worst: str, spare: float) -> None:
+    def add(self, state: SearchState, phase: Phase, worst: str, spare: float) -> None:
+        """Record an iterate with its worst demand, and what that has to spare."""
         iterate = Iterate(
             number=len(self.history),
             run=self.run,

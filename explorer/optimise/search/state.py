@@ -19,9 +19,6 @@ from explorer.workspace.limits import constraints
 from explorer.workspace.slices.volume import unexplained_volume
 from explorer.workspace.workspace import Workspace
 
-UNBOUNDED = (-np.inf, np.inf)
-"""Bounds of a scaled variable that has none."""
-
 Chain = Mapping[str, FloatArray]
 """By parameter of a workspace: its derivatives by the n scaled variables, shape (n,)."""
 
@@ -113,14 +110,10 @@ class SearchState:
                 total += derivative * self.chain[name]
         return total
 
-    def slack(
+    def slack_slopes(
         self, limit: constraints.BallOrCylinder | constraints.HalfSpace, p: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the slacks (k,) of a limit at positions (k, 3), and their derivatives.
-
-        These are by the scaled variables with the position fixed (k, n), and by the position
-        (k, 3).
-        """
+    ) -> FloatArray:
+        """Return the derivatives of the slack of a limit at fixed positions (k, 3), (k, n)."""
         by_limit = np.ones((len(p), 4))
         match limit:
             case constraints.BallOrCylinder():
@@ -130,10 +123,9 @@ class SearchState:
                 distance = np.sqrt(np.einsum("ki,ki->k", offsets, offsets))
                 by_limit[:, :3] = offsets / np.maximum(distance, 1e-300)[:, None]
                 by_limit *= 1.0 if limit.inside else -1.0
-                by_p = -by_limit[:, :3]
             case constraints.HalfSpace():
-                by_limit[:, :3], by_p = -p, np.broadcast_to(-limit.normal, p.shape)
-        return limit.slack(p), by_limit @ self.motion(limit), by_p
+                by_limit[:, :3] = -p
+        return by_limit @ self.motion(limit)
 
     def motion(self, limit: constraints.BallOrCylinder | constraints.HalfSpace) -> FloatArray:
         """Return the derivatives of a limit's centre and radius, or normal and offset, (4, n)."""
