@@ -28,7 +28,6 @@ from explorer.app.widgets.markup import dim
 from explorer.app.widgets.theme import Theme
 from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
 from explorer.jobs.jobs import Jobs
-from explorer.measures.blocks.source import Source
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Command, Commands
 
@@ -135,9 +134,9 @@ class Services:
         Chips(self.buttons, self.session, name, "", {"": command})
         return command.html(name, "", "ex-link")
 
-    def copy_button(self, answer: str, source_of: Callable[[State], Source]) -> str:
-        """Add the button that copies how an answer in a state is computed; return it as HTML."""
-        return copy_button(self.buttons, answer, lambda: source_of(self.session.latest_state()))
+    def copy_button(self, answer: str, command_of: Callable[[State], str]) -> str:
+        """Add the button that copies the command of an answer in a state; return it as HTML."""
+        return copy_button(self.buttons, answer, lambda: command_of(self.session.latest_state()))
 
 
 def show(visible: bool, *parts: Any) -> Updates:

@@ -20,7 +20,7 @@ from explorer.export.drawings.slices import ruler
 from explorer.export.report import mechanism, workspace
 from explorer.export.report.data import ReportData
 from explorer.files.packaged import packaged_file, versions
-from explorer.measures.blocks import source as sources
+from explorer.measures.blocks import commands
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import encode_design
@@ -231,9 +231,9 @@ def _range(curve: Curve) -> tuple[float, float]:
 
 def _reproduction(data: ReportData) -> Iterator[Element]:
     yield element("h2", "How to reproduce it")
-    name, record = sources.name_of(data.design), data.record
+    name, record = commands.name_of(data.design), data.record
     where: tuple[Piece, ...] = ("The design is a preset of the explorer. ",)
-    if name == sources.DESIGN_FILE:
+    if name == commands.DESIGN_FILE:
         where = ("Save the file below as ", element("code", name), ". ")
     yield paragraph(*where, "These commands give the same figures:")
     yield element("pre", "\n".join(_commands(data, shlex.quote(name))), id="commands")
@@ -262,15 +262,15 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     turned = "" if data.is_home else f" --quaternion {' '.join(map(repr, pose.quaternion))}"
     legs = " --interference" if isinstance(data.accessible, AccessibleWorkspace) else ""
     record = "" if data.record is None else " --record record.json"
-    at = sources.pose_options(design, pose)
+    at = commands.pose_options(design, pose)
     yield f"explorer report --design {source}{at}{record} --out report.html"
     yield f"explorer workspace --design {source}{turned} --hull{legs}"
-    yield sources.pose_source("singularity", design, pose).command
-    yield sources.pose_source("interference", design, pose).command
+    yield commands.pose_command("singularity", design, pose)
+    yield commands.pose_command("interference", design, pose)
     if data.has("is_loaded") or data.has("is_limited"):
-        yield sources.load_source("forces", LoadedPose(design, pose)).command
+        yield commands.load_command("forces", LoadedPose(design, pose))
     if data.precision is not None:
-        yield sources.load_source("accuracy", data.precision.loaded).command
+        yield commands.load_command("accuracy", data.precision.loaded)
     if data.carrying_part is not None:
         yield f"explorer workspace --design {source}{turned} --load 0 0 0"
     if not isinstance(data.bill, ExplorerError):

@@ -25,7 +25,7 @@ from explorer.legs.clearance import PAIRS, legs_of, pair_name
 from explorer.legs.interference import swept_tetrahedra
 from explorer.measures.blocks.block import Statement
 from explorer.measures.blocks.clearances import move_clearances, pose_clearances
-from explorer.measures.blocks.source import pose_source
+from explorer.measures.blocks.commands import pose_command
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.rgb import OUTLINE
 from explorer.page.widgets.assigning import Updates
@@ -38,7 +38,7 @@ class ClearancePanel:
         gui = services.gui
         self._copy = services.copy_button(
             "Workspace › Clearance",
-            lambda state: pose_source("interference", state.design, state.pose),
+            lambda state: pose_command("interference", state.design, state.pose),
         )
         self._controls = controls = Controls(services)
         with gui.add_folder("Clearance"):

@@ -94,7 +94,7 @@ class ForcesPanel:
         self._tables = gui.add_html("")
         self._most = gui.add_html("")
         self._copy = services.copy_button(
-            "Loads › Forces", lambda state: self._loads.source("forces", state)
+            "Loads › Forces", lambda state: self._loads.command("forces", state)
         )
         self._go = services.link(
             "forces.go",

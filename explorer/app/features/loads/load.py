@@ -14,7 +14,7 @@ from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
 from explorer.app.state.state import State
-from explorer.measures.blocks.source import LoadTopic, Source, load_source
+from explorer.measures.blocks.commands import LoadTopic, load_command
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.motion.weights import MovingBodies
@@ -127,11 +127,11 @@ class Loads:
             self._last = state, weights, ToolPrecision(loaded)
         return self._last[2]
 
-    def source(self, topic: LoadTopic, state: State) -> Source:
-        """Return how the answer of a command in a state is computed."""
+    def command(self, topic: LoadTopic, state: State) -> str:
+        """Return the command that gives the answer in a state."""
         loaded = self.of(Frame(state))
         density = None if loaded.own is None else state.view.prototype.density
-        return load_source(topic, loaded, density)
+        return load_command(topic, loaded, density)
 
 
 @dataclass(frozen=True)

@@ -139,7 +139,7 @@ class PrecisionPanel:
             ),
         )
         self._copy = services.copy_button(
-            "Loads › Precision", lambda state: self._loads.source("accuracy", state)
+            "Loads › Precision", lambda state: self._loads.command("accuracy", state)
         )
         self._assume = services.link(
             "precision.typical",

@@ -27,7 +27,7 @@ from explorer.app.widgets.markup import box, caption, dim, margin_name, meter, s
 from explorer.export.drawings.markup import as_html, circle, element
 from explorer.measures.blocks import singularity as blocks
 from explorer.measures.blocks.block import Column, Facts, Statement, head_of
-from explorer.measures.blocks.source import pose_source
+from explorer.measures.blocks.commands import pose_command
 from explorer.measures.verdict import DISTANCE_SHARE, warnings
 from explorer.mechanism.folds import FOLD_LINES, FOLDS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
@@ -54,7 +54,7 @@ class SingularityPanel:
         self._controls = controls = Controls(services)
         self._summary = gui.add_html("")
         self._copy = services.copy_button(
-            "Singularity", lambda state: pose_source("singularity", state.design, state.pose)
+            "Singularity", lambda state: pose_command("singularity", state.design, state.pose)
         )
         self._table = gui.add_html("")
         services.do_on_press(GO, lambda value: work.GoToSingularity(int(value)), {"1", "2", "3"})
