@@ -35,9 +35,9 @@ from explorer.workspace.orientations.share import (
     orientation_share,
 )
 from explorer.workspace.orientations.tilts import (
-    TiltByTorsion,
+    GreatestTilt,
     greatest_tilts,
-    tilt_by_torsion,
+    tilt_at_best_torsion,
     tilt_map,
 )
 from explorer.workspace.solids.solid import Solid
@@ -128,14 +128,14 @@ class PositionDrawing:
     """The share of orientations that a position can have, and the greatest tilts by torsion."""
 
     share: OrientationShare
-    by_torsion: TiltByTorsion
+    best: GreatestTilt
 
 
 def orientations_at(request: PositionRequest) -> PositionDrawing:
     """Return the orientations that a position can have."""
     design, position, tool = request
     share = orientation_share(design, position, tool=tool)
-    return PositionDrawing(share, tilt_by_torsion(design, position, tool=tool))
+    return PositionDrawing(share, tilt_at_best_torsion(design, position, tool))
 
 
 TiltsRequest: TypeAlias = tuple[Design, float, Triple | None]
