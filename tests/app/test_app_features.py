@@ -30,7 +30,7 @@ from explorer.app.features.history.feature import OpenSession
 from explorer.app.features.loads.load import WEIGHTS_FEED, SetForce
 from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import AddIterates, Compare, EndRun
-from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
+from explorer.app.features.orientation.work import TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import AdvanceJourney, SetEnd, SetPathTime, TakePlan
 from explorer.app.features.requirement.state import OpenFound
 from explorer.app.features.studies.actions import PickDesign
@@ -52,7 +52,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import SetVariable
 from explorer.app.state.moves import SetAngle, SetJoint, SetPose, SetPosition, StartThere
 from explorer.app.state.parts import value_at, with_value
-from explorer.app.state.view import OrientationView
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.chips import StateCommand
 from explorer.errors import ExplorerError
@@ -248,11 +247,11 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
     running = start(OPTIMAL, port=0, panels=False)
     try:
         page = running.page
-        page.session.do(Set("view.orientation", OrientationView(tilts=True, over="inclusive")))
+        page.session.do(Set("view.tilts", True))
         page.session.do(Set("view.forces.weighed", "payload and legs"))
         assert page.session.wait_until_idle()
         get = page.services.get
-        feeds: tuple[Feed[Any, Any], ...] = (get(TILTS_FEED), get(RANGE_FEED), get(WEIGHTS_FEED))
+        feeds: tuple[Feed[Any, Any], ...] = (get(TILTS_FEED), get(WEIGHTS_FEED))
         assert all(feed.request is not None for feed in feeds)
     finally:
         running.stop()

@@ -51,7 +51,6 @@ IN_OTHER_UNITS = """
 paths: seconds, duration, request
 optimisation.request: starts
 view.prototype: exploded, density
-view.orientation: range, turn
 view.forces: force, moment, scale
 view.precision: times, wanted, wanted_turn
 """

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Generator
-from dataclasses import replace
 from html import unescape
 from typing import Any
 
@@ -19,7 +18,6 @@ from explorer.app.features.orientation.feature import (
     ORIENTATION,
     best_words,
     nodes_beside_cut,
-    range_words,
     summary,
 )
 from explorer.app.features.workspace.feeds import workspace_request
@@ -33,9 +31,8 @@ from explorer.app.state.view import WorkspaceView
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.rgb import css
-from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_from_rotation, tilt_torsion_of
-from explorer.numerics.number_text import UNITS
-from explorer.workspace.orientations.share import cone_of_directions, orientation_share
+from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
+from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,
     TiltMap,
@@ -43,16 +40,11 @@ from explorer.workspace.orientations.tilts import (
     tilt_at_best_torsion,
     tilt_map,
 )
-from explorer.workspace.solids.solids import inclusive_solid, total_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = tilt_torsion_of(OPTIMAL.home_pose.rotation)
-
-
-def show(state: State, **changes: Any) -> State:
-    return Set("view.orientation", replace(state.view.orientation, **changes)).apply(state)
 
 
 def facts_of(markup: str, name: str = "tilts") -> dict[str, Any]:
@@ -67,7 +59,7 @@ def tilts() -> Generator[work.TiltsDrawing]:
         patch.setattr(work, "NODES", 8)
         services, jobs = services_and_worker()
         feed = services.get(work.TILTS_FEED)
-        feed.follow(Frame(show(open_state(OPTIMAL), tilts=True)))
+        feed.follow(Frame(Set("view.tilts", True).apply(open_state(OPTIMAL))))
         jobs.work()
         assert feed.drawing is not None
         yield feed.drawing
@@ -185,53 +177,6 @@ def test_tilts_over_positions_are_the_greatest_of_each(tilts: work.TiltsDrawing)
     for index in np.random.default_rng(0).integers(len(tilts.tilts), size=20):
         expected = greatest_tilt(OPTIMAL, tilts.positions[index], torsion).tilt
         assert tilts.tilts[index] == pytest.approx(expected, abs=1e-6)
-
-
-def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(work, "ORIENTATIONS", 8)
-    rotations = cone_of_directions(OPTIMAL.home_pose.rotation, 15.0, 8)
-    volumes: dict[str, float] = {}
-    for over, make, bound in (
-        ("total", total_solid, "at most "),
-        ("inclusive", inclusive_solid, "at least "),
-    ):
-        services, jobs = services_and_worker()
-        feed = services.get(work.RANGE_FEED)
-        feed.follow(Frame(show(open_state(OPTIMAL), over=over, range=15.0)))
-        jobs.work()
-        assert feed.drawing is not None
-        volumes[over] = feed.drawing.solid.volume
-        assert volumes[over] == pytest.approx(make(OPTIMAL, rotations).volume, rel=1e-3)
-        assert bound in range_words(feed.drawing, UNITS)
-    assert volumes["total"] < volumes["inclusive"]
-
-
-def test_range_turns_the_tilted_orientations_either_way() -> None:
-    home = OPTIMAL.home_pose
-    tilted = work.orientations_over(work.RangeRequest(OPTIMAL, 15.0, 0.0, "total"))
-    np.testing.assert_array_equal(
-        tilted, cone_of_directions(home.rotation, 15.0, work.ORIENTATIONS)
-    )
-    turned = work.orientations_over(work.RangeRequest(OPTIMAL, 15.0, 10.0, "total"))
-    angles = tilt_torsion_from_rotation(home.rotation.T @ turned)
-    assert angles[:, 1].max() == pytest.approx(15.0, abs=1e-9)
-    torsions, counts = np.unique(angles[:, 2].round(6), return_counts=True)
-    assert torsions.tolist() == [-10.0, 0.0, 10.0]
-    assert len(set(counts.tolist())) == 1
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        *(({"turn": turn}, "turns must be 0° to 180°") for turn in (-1.0, 181.0)),
-        *(({"range": tilt}, "above 0° and up to 180°") for tilt in (0.0, 181.0)),
-    ],
-)
-def test_range_or_turn_beyond_half_a_turn_is_refused(changes: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        show(open_state(OPTIMAL), **changes)
 
 
 def test_best_torsion_is_told_beside_the_present_one(best: GreatestTilt) -> None:

@@ -30,7 +30,7 @@ from explorer.app.features.mechanism.feature import MovePanel
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.orientation.feature import OrientationPanel, OrientationScene
-from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, SetTiltTorsion
+from explorer.app.features.orientation.work import TILTS_FEED, SetTiltTorsion
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.feature import PathScene
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
@@ -503,7 +503,7 @@ def test_file_of_the_workspace_is_named_after_the_tool(services: Services, desk:
 
 
 def test_nodes_of_tilts_are_where_the_tool_is_at_tilt_zero(services: Services) -> None:
-    state = Set("view.orientation.tilts", True).apply(state_at())
+    state = Set("view.tilts", True).apply(state_at())
     drawing = draw(services, TILTS_FEED, state)
     scene, scale = OrientationScene(services), scene_scale(state)
 
@@ -536,8 +536,6 @@ def test_tab_of_tilts_has_the_largest_tilt_about_the_tool(services: Services) ->
     def largest_tilt(state: State) -> str:
         return re.findall(r'ex-large">([\d.]+)°', markup_of(panel, state))[0]
 
-    over = Set("view.orientation.over", "total").apply(state)
-    assert draw(services, RANGE_FEED, over).request.tool == (0.5, 0.0, 2.0)
     text = largest_tilt(state)
     assert largest_tilt(Set("view.at", "b4").apply(state)) != text
     inside, beyond = (

@@ -42,7 +42,6 @@ from explorer.app.state.geometry import SetVariable
 from explorer.app.state.moves import SetJoint, SetPose, SetPosition
 from explorer.app.state.view import (
     ForcesView,
-    OrientationView,
     PrecisionView,
     PrototypeView,
     SingularView,
@@ -152,11 +151,7 @@ SCENES = {
     ),
     # Cut open as above, so that the tilts inside are seen.
     "tilt": Scene(
-        actions=(
-            bare(
-                orientation=OrientationView(tilts=True), workspace=WorkspaceView(cut="y", level=5.0)
-            ),
-        ),
+        actions=(bare(tilts=True, workspace=WorkspaceView(cut="y", level=5.0)),),
         panels=True,
         tab="Tilt",
         size=(1280, 900),

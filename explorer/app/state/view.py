@@ -52,33 +52,6 @@ class WorkspaceView:
 
 
 @dataclass(frozen=True)
-class OrientationView:
-    """The drawn measure of the orientations over the workspace.
-
-    Attributes:
-        tilts: Whether the greatest tilts at nodes are drawn.
-        range: Largest tilt from the orientation of home in that range, in degrees.
-        turn: Largest change of torsion either way in that range, in degrees.
-
-    Raises:
-        InputError: A tilt that is not above 0 and up to 180, or a turn that is not 0 to 180.
-    """
-
-    tilts: bool = False
-    over: Literal["none", "inclusive", "total"] = "none"
-    range: float = 20.0
-    turn: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.range <= 180.0:
-            most, got = format_apart((180.0, self.range), 4, format_number)
-            raise InputError(f"the tilts must be above 0° and up to {most}°; got {got}°")
-        if not 0.0 <= self.turn <= 180.0:
-            low, high, got = format_apart((0.0, 180.0, self.turn), 4, format_number)
-            raise InputError(f"the turns must be {low}° to {high}°; got {got}°")
-
-
-@dataclass(frozen=True)
 class PrototypeView:
     """How the prototype is shown.
 
@@ -203,6 +176,7 @@ class View:
         leaves: Whether the two inner leaves are drawn, with the folds beside them.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
         ghosts: Whether the seven other assembly modes are drawn.
+        tilts: Whether the greatest tilts at nodes over the workspace are drawn.
         warn_below: The length below which margins are warned of, in design units; distances
             are warned of below a share of it, see `explorer.measures.verdict`. None for a share of
             the reach.
@@ -227,10 +201,10 @@ class View:
     machine: bool = True
     swept: bool = False
     ghosts: bool = False
+    tilts: bool = False
     warn_below: float | None = field(default=None, metadata=LENGTHS)
     prototype: PrototypeView = field(default_factory=PrototypeView)
     workspace: WorkspaceView = field(default_factory=WorkspaceView, metadata=LENGTHS)
-    orientation: OrientationView = field(default_factory=OrientationView)
     singular: SingularView = field(default_factory=SingularView)
     forces: ForcesView = field(default_factory=ForcesView)
     precision: PrecisionView = field(default_factory=PrecisionView)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import partial
 from typing import Annotated
 
 import msgspec
@@ -18,20 +17,15 @@ from explorer.app.inputs.bindings import item
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.scene.shapes import NO_MESH, add_translucent, draw_mesh
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
-from explorer.app.widgets.blocks import content_of
 from explorer.app.widgets.markup import alert, box, caption, dim, remark, row, table
 from explorer.app.widgets.under_way import UnderWay, look_of, problem
-from explorer.measures.blocks.block import Fact, Facts
 from explorer.measures.box import corners_of
-from explorer.mechanism.rgb import Rgb
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.numerics.number_text import Unit, format_decimals
+from explorer.numerics.number_text import format_decimals
 from explorer.page.browser.browser_facts import decode_text
 from explorer.page.browser.viser_gaps import run_script
 from explorer.page.look import read_script
@@ -42,22 +36,14 @@ from explorer.workspace.orientations.tilts import (
     tilt_map,
 )
 
-COLOURS: dict[str, Rgb] = {"inclusive": (96, 140, 196), "total": (30, 150, 135)}
-OPACITY = 0.22
 # Size of a point over the distance of nodes.
 POINT_SHARE = 0.12
-OVER = ("none", "inclusive", "total")
 SPANS = (Span(-180.0, 180.0, 0.1), Span(0.0, 180.0, 0.1), Span(-180.0, 180.0, 0.1))
 HINTS = (
     "Direction in the base's xy-plane, from x towards y, that the platform's z-axis tilts towards.",
     "Angle between the z-axes of platform and base. With azimuth and torsion: the T&T angles.",
     "Turn of the platform about its own z-axis; at tilt 0 it is the yaw.",
 )
-VOLUME_HINT = "Volume of the solid as drawn. A sample of orientations stands for the range:"
-BOUNDS = {
-    "inclusive": ("at least", "positions that have only others of the range are left out."),
-    "total": ("at most", "positions that lack only others of the range are in it."),
-}
 NO_NODES: BoolArray = np.zeros(0, dtype=np.bool_)
 # Tilt below which the azimuth has no effect, in degrees.
 LEVEL = 1e-6
@@ -72,7 +58,7 @@ class OrientationPanel:
     def __init__(self, services: Services) -> None:
         gui = services.gui
         self._here = services.get(work.POSITION_FEED)
-        self._tilts, self._ranges = services.get(work.TILTS_FEED), services.get(work.RANGE_FEED)
+        self._tilts = services.get(work.TILTS_FEED)
         self._controls = controls = Controls(services)
         self._top = gui.add_html("")
         self._map = gui.add_html("")
@@ -90,35 +76,10 @@ class OrientationPanel:
                 "Greatest tilts",
                 "Draw the greatest tilt in every azimuth, at the present torsion, at nodes over "
                 "the workspace. The cut of the workspace opens them too.",
-                "view.orientation.tilts",
+                "view.tilts",
             )
             self._scale = gui.add_html("", visible=False)
             self._tilts_under_way = UnderWay(services, "tilts", self._tilts)
-            controls.dropdown(
-                "Solid over tilts",
-                "Draw the positions that allow at least one (inclusive workspace) or all (total "
-                "workspace) of the orientations within a tilt and a turn from that of home.",
-                OVER,
-                "view.orientation.over",
-                is_in_palette=True,
-            )
-            controls.number(
-                "Tilts from home up to (°)",
-                "Largest tilt from the orientation of home, in degrees.",
-                "view.orientation.range",
-                least=0.0,
-                step=1.0,
-                visible=_has_range,
-            )
-            controls.number(
-                "Torsions from home ± (°)",
-                "Largest change of the torsion from that of home, either way, in degrees.",
-                "view.orientation.turn",
-                least=0.0,
-                step=1.0,
-                visible=_has_range,
-            )
-            self._volume = gui.add_html("", visible=False)
         services.do_on_press("orientation.go", _tilt)
         run_script(services.server, read_script("tilts"))
 
@@ -136,23 +97,15 @@ class OrientationPanel:
         yield self._legend, "content", box(title, maps.legend(tilts))
         yield from self._controls.updates(frame)
         yield from self._tilts_under_way.updates()
-        view = frame.state.view.orientation
         title, button = "The tilts could not be computed", "Compute the tilts"
         scale = html_of(self._tilts, maps.scale_of_tilts, title, button)
-        yield from show_html(self._scale, box(scale) if view.tilts else "")
-        words = partial(range_words, unit=frame.state.unit)
-        volume = html_of(self._ranges, words, "The solid could not be made")
-        yield from show_html(self._volume, box(volume) if view.over != "none" else "")
+        yield from show_html(self._scale, box(scale) if state.view.tilts else "")
 
 
 def _tilt(text: str) -> Action | None:
     """Return the action that tilts the platform as a page sent it, (azimuth, tilt) in degrees."""
     angles: tuple[float, float] | None = decode_text(text, _TILT)
     return None if angles is None else work.GoToTilt(*angles)
-
-
-def _has_range(state: State) -> bool:
-    return state.view.orientation.over != "none"
 
 
 def summary(
@@ -203,28 +156,16 @@ def best_words(best: GreatestTilt, tilt: float) -> str:
     return f"{_degrees(best.tilt)} at {_degrees(best.torsion)}"
 
 
-def range_words(drawing: work.RangeDrawing, unit: Unit) -> str:
-    """Return the volume over a range of tilts in a unit of lengths, as HTML."""
-    solid, design = drawing.solid, drawing.request.design
-    if solid.is_empty:
-        return alert("This workspace is empty", f"Emptied by: {', '.join(solid.empty_because)}.")
-    bound, hint = BOUNDS[drawing.request.over]
-    size = design.reach**3
-    text = f"{bound} {unit.to_power(3, size).text(solid.volume, 5, size=size)}"
-    name = f"{drawing.request.over.capitalize()} workspace"
-    return content_of(Facts("", [Fact(name, text, hint=f"{VOLUME_HINT} {hint}")]), {})
-
-
 def _degrees(angle: float) -> str:
     return f"{format_decimals(angle, 1)}°"
 
 
 class OrientationScene(ScenePart):
-    """Points in the colours of their tilts, and the solid of a range."""
+    """Points over the workspace in the colours of their tilts."""
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._tilts, self._ranges = services.get(work.TILTS_FEED), services.get(work.RANGE_FEED)
+        self._tilts = services.get(work.TILTS_FEED)
         self._points = scene.add_point_cloud(
             "/orientation/tilts",
             np.zeros((1, 3), dtype=np.float32),
@@ -233,33 +174,25 @@ class OrientationScene(ScenePart):
             point_shape="circle",
             visible=False,
         )
-        self._solid = add_translucent(scene, "/orientation/range", NO_MESH, OPACITY)
 
     def updates(self, placed: Placed) -> Updates:
-        """Yield the updates that draw tilts and range of a frame."""
-        view, scale = placed.frame.state.view.orientation, placed.scale
+        """Yield the updates that draw the tilts of a frame."""
+        view, scale = placed.frame.state.view, placed.scale
         tilts = self._tilts.drawing if view.tilts else None
-        cut = placed.frame.state.view.workspace
-        visible = NO_NODES if tilts is None else nodes_beside_cut(tilts, cut)
+        visible = NO_NODES if tilts is None else nodes_beside_cut(tilts, view.workspace)
         yield self._points, "visible", bool(visible.any())
         if tilts is not None and visible.any():
             yield self._points, "points", (scale * tilts.positions[visible]).astype(np.float32)
             yield self._points, "colors", maps.colours_of(tilts.tilts[visible], maps.most_of(tilts))
             yield self._points, "point_size", POINT_SHARE * scale * tilts.step
-        over = self._ranges.drawing if view.over != "none" else None
-        has_solid = over is not None and not over.solid.is_empty
-        yield self._solid, "visible", has_solid
-        if over is not None and has_solid:
-            yield self._solid, "color", COLOURS[over.request.over]
-            yield from draw_mesh(self._solid, (scale * over.solid.vertices, over.solid.faces))
 
     def corners(self, placed: Placed) -> FloatArray:
-        """Return the corners of the boxes about the nodes and about the solid of the range."""
-        tilts, ranged = self._tilts.drawing, self._ranges.drawing
-        drawn = [tilts.positions] if tilts is not None else []
-        drawn += [ranged.solid.vertices] if ranged is not None else []
-        boxes = [corners_of(np.array([p.min(axis=0), p.max(axis=0)])) for p in drawn if len(p)]
-        return placed.scale * np.concatenate([NO_POINTS, *boxes])
+        """Return the corners of the box about the nodes."""
+        tilts = self._tilts.drawing
+        if tilts is None or not len(tilts.positions):
+            return NO_POINTS
+        ends = np.array([tilts.positions.min(axis=0), tilts.positions.max(axis=0)])
+        return placed.scale * corners_of(ends)
 
 
 def nodes_beside_cut(drawing: work.TiltsDrawing, view: WorkspaceView) -> BoolArray:
@@ -276,5 +209,5 @@ ORIENTATION = Feature(
     manual="orientation.md#On the page",
     tabs=(Tab("analyse", "Tilt", OrientationPanel, viser.Icon.COMPASS),),
     scene=(OrientationScene,),
-    later_feeds=(work.POSITION_FEED, work.TILTS_FEED, work.RANGE_FEED),
+    later_feeds=(work.POSITION_FEED, work.TILTS_FEED),
 )

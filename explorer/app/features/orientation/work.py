@@ -1,15 +1,13 @@
-"""Actions on the orientation, and the worker's tasks on the tilts of positions and of ranges."""
+"""Actions on the orientation, and the worker's tasks on the tilts of positions."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from explorer.app.features.workspace.work import LIVE_TOLERANCE
 from explorer.app.session.feed import Feed, FeedOf, watch_of
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
@@ -31,7 +29,6 @@ from explorer.workspace.accessible.nodes import make_cell_grid
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.orientations.share import (
     OrientationShare,
-    cone_of_directions,
     orientation_share,
 )
 from explorer.workspace.orientations.tilts import (
@@ -40,8 +37,6 @@ from explorer.workspace.orientations.tilts import (
     tilt_at_best_torsion,
     tilt_map,
 )
-from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import inclusive_solid, total_solid
 from explorer.workspace.workspace import Workspace
 
 ANGLES = ("azimuth", "tilt", "torsion")
@@ -116,8 +111,6 @@ NODES = 20
 PARTS = 10
 # Digits of a torsion in degrees beyond which tilts are not computed again.
 DIGITS = 3
-# Number of orientations that stand for a range of tilts, alone and with each of three torsions.
-ORIENTATIONS, TURNED_ORIENTATIONS = 33, 17
 
 PositionRequest: TypeAlias = tuple[Design, Triple, Triple | None]
 """A request for the orientations that a position of b4, or of a tool point, can have."""
@@ -174,58 +167,11 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     return TiltsDrawing(nodes[known], tilts[known], step)
 
 
-@dataclass(frozen=True)
-class RangeRequest:
-    """A request for the positions that have one or all of a range of orientations about home.
-
-    The tilt is at most `tilt` from that of home, the torsion at most `turn` either way, in degrees.
-    """
-
-    design: Design
-    tilt: float
-    turn: float
-    over: Literal["inclusive", "total"]
-    tool: Triple | None = None
-
-
-@dataclass(frozen=True)
-class RangeDrawing:
-    """A workspace over a range of tilts."""
-
-    request: RangeRequest
-    solid: Solid
-
-
-def orientations_over(request: RangeRequest) -> FloatArray:
-    """Return the orientations that stand for a range, shape (n, 3, 3)."""
-    rotation, turn = request.design.home_pose.rotation, math.radians(request.turn)
-    if turn == 0.0:
-        return cone_of_directions(rotation, request.tilt, ORIENTATIONS)
-    tilted = cone_of_directions(rotation, request.tilt, TURNED_ORIENTATIONS)
-    turns = Rotation.from_rotvec([[0.0, 0.0, angle] for angle in (-turn, 0.0, turn)]).as_matrix()
-    return (tilted[:, None] @ turns).reshape(-1, 3, 3)
-
-
-def range_solid(request: RangeRequest) -> RangeDrawing:
-    """Return the workspace over a range of orientations."""
-    make = inclusive_solid if request.over == "inclusive" else total_solid
-    tolerance = LIVE_TOLERANCE * request.design.reach
-    solid = make(request.design, orientations_over(request), tolerance, request.tool)
-    return RangeDrawing(request, solid)
-
-
 def _tilts_of(frame: Frame) -> TiltsRequest | None:
-    if not frame.state.view.orientation.tilts:
+    if not frame.state.view.tilts:
         return None
     torsion = round(frame.state.tilt_torsion.torsion, DIGITS)
     return frame.state.design, torsion, frame.state.tool
-
-
-def _range_of(frame: Frame) -> RangeRequest | None:
-    view = frame.state.view.orientation
-    if view.over == "none":
-        return None
-    return RangeRequest(frame.state.design, view.range, view.turn, view.over, frame.state.tool)
 
 
 PositionFeed: TypeAlias = Feed[PositionRequest, PositionDrawing]
@@ -233,4 +179,3 @@ POSITION_FEED = FeedOf(
     orientations_at, lambda frame: (frame.state.design, frame.state.position, frame.state.tool)
 )
 TILTS_FEED = FeedOf(tilts_at_nodes, _tilts_of, has_stages=True)
-RANGE_FEED = FeedOf(range_solid, _range_of)
