@@ -43,7 +43,7 @@ from explorer.app.features.paths.panel import (
     plan_words,
 )
 from explorer.app.features.paths.plots import (
-    LoadPlot,
+    LoadsAlong,
     crossing_time,
     crossing_words,
     margin_columns,
@@ -520,7 +520,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces() -> None:
 def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     state = straight(Set("view.at", "tool"))
     journey = path_of(state)
-    found = LoadPlot(services).shares(Frame(state))
+    found = LoadsAlong(services).shares(Frame(state))
     assert found is not None
     expected = path_loads(PRESS, journey.poses, state.load, tool=journey.tool)
     np.testing.assert_array_equal(found.path.utilisations, expected.utilisations)

@@ -75,6 +75,7 @@ class PathsPanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
+        self._loads = plots.LoadsAlong(services)
         self._downloads, self._controls = services.downloads, Controls(services)
         kinds = {
             kind: StateCommand(f"Paths › {words}", hint, *choose("paths.kind", kind, "Path"))
@@ -124,7 +125,6 @@ class PathsPanel:
                 disabled=lambda state: journey_of(state) is None,
             )
             self._margins = plots.MarginPlot(gui)
-            self._loads = plots.LoadPlot(services)
         with gui.add_folder("Drives"):
             self._drives = DrivesPanel(services, self._controls)
         services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
@@ -166,7 +166,7 @@ class PathsPanel:
         title = plan_words(state) or path_title(state, self._loads.shares(frame), self._clear)
         yield self._title, "content", title
         yield from show_html(self._demand, plots.demand_note(state))
-        for part in (self._margins, self._loads, self._drives):
+        for part in (self._margins, self._drives):
             yield from part.updates(frame)
         yield from self._controls.updates(frame)
 

@@ -1,17 +1,14 @@
-"""The charts over the time of a path: margins, and shares of the limits under a load."""
+"""The margins over the time of a path as a chart, and the shares of the limits under a load."""
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Iterable
 from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
 import viser
 from numpy.typing import ArrayLike, NDArray
-from viser import uplot
 
 from explorer.app.features.feature import Services, show_html
 from explorer.app.features.loads.load import Loads
@@ -19,7 +16,6 @@ from explorer.app.features.paths.state import Journey, Paths, journey_of
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.charts import (
-    BLUE,
     NEUTRAL,
     ORANGE,
     add_chart,
@@ -44,66 +40,10 @@ DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
 STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
 # Room above and below the values of a chart, as a share of their span.
 ROOM = 0.08
-# Heights of the charts between their axes, and the room for the numbers of time, in pixels.
-MARGIN_HEIGHT, LOAD_HEIGHT, TIME_ROOM = 78, 62, 26
+# Height of the chart, and the room for the numbers of time in it, in pixels.
+HEIGHT, TIME_ROOM = 112, 26
 # Number of crossings that are listed; the others are counted.
 MOST_LISTED = 4
-# Least and greatest top of the chart, in percent; beyond it shares leave the chart.
-LEAST_TOP, MOST_TOP = 120.0, 250.0
-
-
-class TimeChart:
-    """A chart over time, whose axis has no words: the slider above the chart names it.
-
-    The series come without the line at the present time; the axes are the vertical one, and that
-    of its levels, at the right.
-    """
-
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        series: tuple[uplot.Series, ...],
-        axes: tuple[uplot.Axis, uplot.Axis],
-        height: int,
-    ) -> None:
-        self._handle = add_chart(
-            gui,
-            (*series, line("now", NEUTRAL, width=1.5)),
-            (axis("", label_size=0, size=TIME_ROOM), *axes),
-            height=8 + height + TIME_ROOM,
-            padding=(8, 0, 0, 0),
-        )
-
-    def show(self, columns: tuple[NDArray[Any], ...], *, is_visible: bool) -> Updates:
-        """Yield the updates that make the chart show its columns."""
-        duration = max(float(columns[0][-1]), 1e-9)
-        span = float(np.nanmin(columns[-1])), float(np.nanmax(columns[-1]))
-        scales = {"x": {"time": False, "range": (0.0, duration)}, "y": {"range": span}}
-        yield self._handle, "scales", scales
-        yield self._handle, "data", columns
-        # viser's chart draws no numbers below it if it appears while it is given data time after
-        # time; so it does not wait for a path that is played at once.
-        yield self._handle, "visible", is_visible
-
-
-def time_columns(
-    times: FloatArray, curves: Iterable[FloatArray], now: float, span: tuple[float, float]
-) -> tuple[NDArray[Any], ...]:
-    """Return the columns of a chart: times in their order, the curves, the line at the present.
-
-    A curve has a value for each time, and twice that at the present; the line goes from the bottom
-    to the top of the chart, its span.
-    """
-    x = np.concatenate([times, [now, now]])
-    order = np.argsort(x, kind="stable")
-    present = np.concatenate([np.full(len(times), np.nan), span])
-    return tuple(column[order] for column in (x, *curves, present))
-
-
-@functools.cache
-def blank_columns(curves: int, span: tuple[float, float]) -> tuple[NDArray[Any], ...]:
-    """Return the columns of a chart while there is no path: a second without values."""
-    return time_columns(np.ones(1), np.full((curves, 3), np.nan), 0.0, span)
 
 
 class JourneyLoads(NamedTuple):
@@ -141,8 +81,15 @@ def demand_note(state: State) -> str:
     return note("No part has a limit, so every load is held: see the tab Machine.")
 
 
+# The columns of the chart while there is no path: a second without values.
+BLANK = (np.ones(2), *np.full((4, 2), np.nan), np.array([-1.0, 1.0]))
+
+
 class MarginPlot:
-    """The chart of the margins and its legend, empty while there is no path."""
+    """The chart of the margins over time and its legend, empty while there is no path.
+
+    Its axis of time has no words: the slider above names it.
+    """
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._legend = gui.add_html("", visible=False)
@@ -150,28 +97,39 @@ class MarginPlot:
             line(f"δ{index}", colour, dash=dash)
             for index, colour, dash in zip((1, 2, 3), MARGIN_COLOURS, DASHES, strict=True)
         )
-        self._chart = TimeChart(
+        self._chart = add_chart(
             gui,
-            (*lines, dots("singular", ORANGE, 9)),
+            (*lines, dots("singular", ORANGE, 9), line("now", NEUTRAL, width=1.5)),
             (
+                axis("", label_size=0, size=TIME_ROOM),
                 axis("margin δ", label_size=18, size=40, space=18),
                 level_axis((0.0,), "flat", ORANGE),
             ),
-            MARGIN_HEIGHT,
+            height=HEIGHT,
+            padding=(8, 0, 0, 0),
         )
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart and its legend show the frame."""
         journey, unit = journey_of(frame.state), frame.state.unit
-        yield from self._chart.show(margin_columns(journey, unit), is_visible=True)
+        columns = BLANK if journey is None else margin_columns(journey, unit)
+        duration = max(float(columns[0][-1]), 1e-9)
+        span = float(np.nanmin(columns[-1])), float(np.nanmax(columns[-1]))
+        scales = {"x": {"time": False, "range": (0.0, duration)}, "y": {"range": span}}
+        yield self._chart, "scales", scales
+        yield self._chart, "data", columns
+        # viser's chart draws no numbers below it if it appears while it is given data time after
+        # time; so it does not wait for a path that is played at once.
+        yield self._chart, "visible", True
         words = "" if journey is None else legend(journey.pose, unit)
         yield from show_html(self._legend, words)
 
 
-def margin_columns(journey: Journey | None, unit: Unit) -> tuple[NDArray[Any], ...]:
-    """Return the columns of the chart: time, margins in a unit, singular poses, present time."""
-    if journey is None:
-        return blank_columns(4, span_of(0.0))
+def margin_columns(journey: Journey, unit: Unit) -> tuple[NDArray[Any], ...]:
+    """Return the columns of the chart: time, margins in a unit, singular poses, present time.
+
+    The line at the present goes from the bottom to the top of the chart.
+    """
     timed, crossings = journey.trajectory, journey.margins.crossings
     poses = [*(crossing.pose for crossing in crossings), journey.pose, journey.pose]
     values = unit.factor * margins(
@@ -180,14 +138,15 @@ def margin_columns(journey: Journey | None, unit: Unit) -> tuple[NDArray[Any], .
             [rotation_from_quaternion(timed.quaternion), [pose.rotation for pose in poses]]
         ),
     )
-    singular = np.full(len(values), np.nan)
+    singular, now = np.full((2, len(values)), np.nan)
     for row, crossing in enumerate(crossings, start=len(timed.time)):
         singular[row] = values[row, crossing.incidence - 1]
     crossing_times = [crossing_time(journey, index) for index in range(len(crossings))]
-    times = np.concatenate([timed.time, crossing_times])
+    times = np.concatenate([timed.time, crossing_times, [journey.at, journey.at]])
     # Without the present pose: the axis must not change while the path is played.
-    span = span_of(np.append(values[: len(times)], 0.0))
-    return time_columns(times, (*values.T, singular), journey.at, span)
+    now[-2:] = span_of(np.append(values[:-2], 0.0))
+    order = np.argsort(times, kind="stable")
+    return tuple(column[order] for column in (times, *values.T, singular, now))
 
 
 def span_of(values: ArrayLike) -> tuple[float, float]:
@@ -238,36 +197,13 @@ def crossing_words(journey: Journey, unit: Unit) -> str:
     return f"<div>{dot}Singular {times}: {listed}</div>"
 
 
-class LoadPlot:
-    """The chart of the shares along the path, for designs with limits."""
+class LoadsAlong:
+    """The shares of the limits along the last path, under the last load."""
 
     def __init__(self, services: Services) -> None:
         self._loads = services.get(Loads)
-        # The shares along the last path, under the last load.
         self._key: tuple[object, ...] = ()
         self._shares: JourneyLoads | None = None
-        vertical = axis("share (%)", label_size=18, size=40, space=22)
-        self._chart = TimeChart(
-            services.gui,
-            (line("share", BLUE), line("beyond the limit", ORANGE)),
-            (vertical, level_axis((100.0,), "limit", NEUTRAL)),
-            LOAD_HEIGHT,
-        )
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the chart show the frame."""
-        journey, loads = journey_of(frame.state), self.shares(frame)
-        if journey is None or loads is None:
-            columns = blank_columns(2, (0.0, LEAST_TOP))
-        else:
-            # Room above the largest share and the limit, in percent.
-            top = float(np.clip(115.0 * loads.path.utilisation, LEAST_TOP, MOST_TOP))
-            # Far above the chart a line is as good as at infinity.
-            percent: FloatArray = np.minimum(100.0 * loads.path.utilisations.max(axis=1), 4.0 * top)
-            share = np.append(percent, np.interp([journey.at] * 2, loads.time, percent))
-            beyond = np.where(share > 100.0, share, np.nan)
-            columns = time_columns(loads.time, (share, beyond), journey.at, (0.0, top))
-        yield from self._chart.show(columns, is_visible=has_limits(frame.state.design))
 
     def shares(self, frame: Frame) -> JourneyLoads | None:
         """Return the shares along the path of a frame; None without a path or without limits.
