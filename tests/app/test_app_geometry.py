@@ -50,7 +50,7 @@ LENGTHS = (
 IN_OTHER_UNITS = """
 paths: seconds, duration, request
 optimisation.request: starts
-view.prototype: exploded, density
+view: density
 view.forces: force, moment, scale
 view.precision: times, wanted, wanted_turn
 """
