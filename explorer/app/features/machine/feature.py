@@ -82,11 +82,6 @@ class MachinePanel:
         self._controls = controls = MachineControls(services)
         # Moments of inertia that are being typed, and the payload that cannot have them.
         self._typed: tuple[Payload, Triple] | None = None
-        controls.button(
-            "Ideal machine",
-            "Take tool, payload, actuators, struts, guide, tolerances and radii of the legs away.",
-            ClearMachine,
-        )
         with controls.folder("Tool on the platform ({unit}, degrees)"):
             self._add_point("tool", "the tool point", "design.tool.position")
             for axis, (name, about, edge) in enumerate(ANGLES):
@@ -129,6 +124,11 @@ class MachinePanel:
             self._add_guide()
         with gui.add_folder("Tolerances", expand_by_default=False):
             self._add_tolerances()
+        controls.button(
+            "Ideal machine",
+            "Take tool, payload, actuators, struts, guide, tolerances and radii of the legs away.",
+            ClearMachine,
+        )
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
