@@ -35,7 +35,6 @@ from explorer.app.state.moves import SetPosition
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView
 from explorer.errors import InputError
-from explorer.export.drawings.slices import OUTLINE_CELLS
 from explorer.measures.blocks.block import UTILISATION_EDGES
 from explorer.measures.position_bands import STEP_COLOURS, UTILISATION_COLOURS
 from explorer.mechanism.configuration import Configuration
@@ -51,6 +50,7 @@ from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.workspace.carried_region import carried_region
+from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.workspace import Workspace
 
@@ -227,22 +227,25 @@ def test_map_has_its_place_for_the_page(axis: Axis, angles: tuple[float, float, 
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_map_has_the_outline_of_the_slice(axis: Axis) -> None:
+def test_map_has_the_exact_outline_of_the_slice(axis: Axis) -> None:
     drawing = drawing_of(with_workspace(open_state(OPTIMAL), solid=True, cut=axis))
     drawn = drawing.slice_map
     assert drawn is not None
-    workspace = Workspace(OPTIMAL, np.array(drawing.request.rotation))
+    rotation = np.array(drawing.request.rotation)
+    outline = slice_outline(Workspace(OPTIMAL, rotation), axis, drawn.level)
+    assert outline is not None
     (data,) = re.findall(r'<path d="([^"]*)" class="edge"', drawn.markup)
-    corners = [[*map(float, each.split(","))] for each in re.findall(r"-?[\d.]+,-?[\d.]+", data)]
-    places = np.array(corners) / drawn.own_scale + np.array(drawn.lows)
-    positions = np.insert(places, "xyz".index(axis), drawn.level, axis=1)
-    spare = workspace.slacks(positions).min(axis=-1)
-    cell = max(np.subtract(drawn.highs, drawn.lows)) / OUTLINE_CELLS
-    # Only corners between two limits are cut, by less than a cell.
-    assert np.abs(spare).max() < 0.75 * cell
-    assert np.quantile(np.abs(spare), 0.9) < 0.02 * cell
-    steps = np.linalg.norm(places - np.roll(places, -1, axis=0), axis=1)
-    assert steps.max() < 1.5 * cell
+    assert data.count("A") >= sum(e.centre is not None for loop in outline for e in loop)
+    corners = np.array(
+        [
+            [float(x) for x in each.split(",")]
+            for each in re.findall(r"(-?[\d.]+,-?[\d.]+)(?=[MLAZ])", data)
+        ]
+    )
+    expected = np.array([edge.end for loop in outline for edge in loop])
+    places = corners / drawn.own_scale + np.array(drawn.lows)
+    for point in expected:
+        assert np.linalg.norm(places - point, axis=1).min() < 2e-3
 
 
 def test_payload_that_does_not_count_has_no_inertia_either() -> None:

@@ -341,7 +341,7 @@ def test_report_missing_values_give_reasons_in_their_place() -> None:
 
 def test_report_swing_limits_are_drawn_from_a_grid() -> None:
     page = page_of(limited(OPTIMAL, swing=Swing(a1=30.0, b4=50.0)))
-    assert "Outlines are those of a fine grid" in page.text
+    assert "the outlines are those of a fine grid" in page.text
     limits = table_of(page, "Limits in force")
     assert "at most 30°" in limits["swing a1"].text
     assert "exact to rounding" not in page.text

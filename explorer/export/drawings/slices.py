@@ -1,12 +1,13 @@
-"""Maps of slices as drawings, for the report and the page: outlines, filled in bands.
+"""Maps of slices as drawings, for the report and the page: exact outlines, filled in bands.
 
 At one orientation each margin is linear in the position, so the positions of a slice at which
-every margin is at least a level are polygons: these bands are exact. The slice itself, bands of
-other measures and collisions of legs are outlined on a fine grid.
+every margin is at least a level are polygons: these bands are as exact as the outline. Bands of
+other measures, limits on swings and collisions of legs are outlined on a fine grid.
 """
 
 from __future__ import annotations
 
+import cmath
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,10 +26,8 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.level_loops import level_loops
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
+from explorer.workspace.slices.outline import AXES, Edge, slice_outline
 from explorer.workspace.workspace import Workspace
-
-AXES = "xyz"
-"""The axes across which a slice can be cut."""
 
 # The space around a map that has ticks, and between maps.
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 12.0, 26.0, 38.0
@@ -36,8 +35,8 @@ MOST_HEIGHT = 290.0
 _TICKS = 5
 # The longer side of a workspace in the drawing's own coordinates.
 OWN_SIZE = 1000.0
-# Cells of a grid on the longer side, also that of the outline; the condition number takes long.
-CELLS, OUTLINE_CELLS, CONDITION_CELLS = 160, 240, 100
+# Cells of a grid on the longer side; those of the condition number take long.
+CELLS, CONDITION_CELLS = 160, 100
 # More contours than a workspace can have.
 CONTOURS = 60
 # Colour and opacity of positions within the limits that are not accessible.
@@ -128,7 +127,10 @@ class Slices:
     def _outline_data(self, axis: str, level: float) -> str:
         """Return the outline of a slice as the data of a path; "" if the slice is empty."""
         lows, scale = self.lows[in_plane(axis)], self.own_scale
-        columns, rows, points = self._grid(axis, level, OUTLINE_CELLS)
+        outline = slice_outline(self.workspace, axis, level)
+        if outline is not None:
+            return "".join(_loop_data(loop, lows, scale) for loop in outline)
+        columns, rows, points = self._grid(axis, level, CELLS)
         slack = self.workspace.slacks(points).min(axis=-1)
         loops = level_loops(columns, rows, slack, 0.0)
         return "".join(path_of((loop - lows) * scale) for loop in loops)
@@ -195,6 +197,29 @@ class Slices:
 def in_plane(axis: str) -> list[int]:
     """Return the indices of the two axes of a slice that is normal to a third."""
     return [index for index, name in enumerate(AXES) if name != axis]
+
+
+def _loop_data(loop: tuple[Edge, ...], lows: FloatArray, scale: float) -> str:
+    """Return a closed loop of edges as the data of a path, scaled from the lows of a map."""
+
+    def text(point: tuple[float, float]) -> str:
+        x, y = ((np.array(point) - lows) * scale).tolist()
+        return f"{coordinate(x)},{coordinate(y)}"
+
+    data = [f"M{text(loop[0].start)}"]
+    for edge in loop:
+        if edge.centre is None:
+            data.append(f"L{text(edge.end)}")
+            continue
+        radius = coordinate(edge.radius * scale)
+        arc = f"A{radius},{radius} 0 0 {int(edge.turn > 0.0)}"
+        if abs(edge.turn) > math.pi - 1e-6:
+            # An arc of a path must be less than a whole circle: two halves are plain.
+            centre, start = complex(*edge.centre), complex(*edge.start)
+            middle = centre + (start - centre) * cmath.exp(0.5j * edge.turn)
+            data.append(f"{arc} {text((middle.real, middle.imag))}")
+        data.append(f"{arc} {text(edge.end)}")
+    return "".join((*data, "Z"))
 
 
 def _clip(polygon: FloatArray, values: FloatArray) -> FloatArray:

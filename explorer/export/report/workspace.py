@@ -30,6 +30,7 @@ from explorer.paths.drives import drive_blocks, drives_along
 from explorer.singularity.colours import WARN_SHARE
 from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.workspace.carried_region import CarriedRegion
+from explorer.workspace.limits.table import bounds_angles
 from explorer.workspace.solids.solid import Solid, convex_hull
 
 
@@ -81,8 +82,12 @@ def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
     yield markup.illustration(
         element("div", slices_through(slices, position), legend(slices, data.design.unit_mm)),
         "Slices through b4 (the cross), axes in design units, coloured by the smallest "
-        "of the three margins. Outlines are those of a fine grid; bands are exact, since margins "
-        "are linear in the position. Beyond the bands, thin lines mark every ",
+        "of the three margins. ",
+        "Limits on swings bound it, so the outlines are those of a fine grid."
+        if bounds_angles(data.design)
+        else "Outlines are exact arcs and lines; bands are exact too, since margins are linear "
+        "in the position.",
+        " Beyond the bands, thin lines mark every ",
         number(slices.contour_step),
         " units of it.",
     )

@@ -1,4 +1,4 @@
-"""The map of a slice of the workspace: the drawing of the report, with axes, and the pose in it.
+"""The map of a slice of the workspace: the report's exact drawing, with axes, and the pose in it.
 
 The worker draws the map itself; the page puts it between axes, marks b4 or the tool point, and
 gives the words for what is under the pointer.
