@@ -1,4 +1,4 @@
-"""The prototype: all parts of a design, their placements, and the bill of materials.
+"""The prototype: all parts of a design, their placements, the exploded view, the bill of materials.
 
 Parts are made once for a design; between poses they move as rigid bodies.
 """
@@ -14,9 +14,13 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.design import Design
 from explorer.motion.chains import BODIES, LEGS, Chains, Places
 from explorer.motion.masses import Mass, total_mass
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.fitting import sizes_of
 from explorer.prototype.shapes import PrototypePart, make_parts
 from explorer.prototype.sizes import Sizes, StrokeRange
+
+# The gap between layers of the exploded view: over the reach, and over the largest leg radius.
+_GAP, _GAP_IN_RADII = 0.05, 6.0
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,37 @@ def make_prototype(design: Design) -> Prototype:
     """
     sizes = sizes_of(design)
     return Prototype(sizes, make_parts(sizes))
+
+
+def exploded_offsets(prototype: Prototype, places: Places) -> FloatArray:
+    """Return the shift of each part in the full exploded view, shape (n, 3), in design units.
+
+    Parts are lifted off the base in layers, each as far as it takes to clear the one below:
+    crosses and carriages, cylinders, rods, balls, and the platform. The parts of one layer
+    keep their places beside each other, however the legs lean.
+    """
+    sizes, parts = prototype.sizes, prototype.parts
+    index = {part.name: i for i, part in enumerate(parts)}
+    cylinders, rods, balls = (
+        [index[f"{kind} {leg}"] for leg in LEGS] for kind in ("cylinder", "rod", "ball")
+    )
+    design = prototype.design
+    gap = max(_GAP * design.reach, _GAP_IN_RADII * max(sizes.radii) / design.unit_mm)
+    up = np.array([0.0, 0.0, float(sizes.chains.side)])
+    tops = np.array([parts[i].vertices[:, 2].max() for i in cylinders])
+    bottoms = np.array([parts[i].vertices[:, 2].min() for i in rods])
+    along = places.rotation[rods][:, :, 2]
+    lengths = np.linalg.norm(places.origin[rods] - places.origin[cylinders], axis=1)
+    overlap = np.maximum(tops - (lengths + bottoms), 0.0) * np.abs(along @ up)
+    # The necks of balls leave the platform along its normal, which may lean.
+    normal = -sizes.chains.platform_side * places.rotation[index["platform"]][:, 2]
+    offsets = np.zeros_like(places.origin)
+    offsets[[i for i, part in enumerate(parts) if part.kind in ("cross", "carriage")]] = gap * up
+    offsets[cylinders] = 2.0 * gap * up
+    offsets[rods] = (3.0 * gap + overlap.max()) * up
+    offsets[balls] = offsets[rods] + gap * normal
+    offsets[index["platform"]] = offsets[balls][0] + gap * normal
+    return offsets
 
 
 @dataclass(frozen=True)

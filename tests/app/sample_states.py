@@ -37,7 +37,7 @@ from explorer.app.state.geometry import SetVariable
 from explorer.app.state.moves import GoHome, SetAngle, SetJoint, SetMode, SetPosition, UseNearest
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, open_state
-from explorer.app.state.view import PrecisionView, SingularView, View, WorkspaceView
+from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measure_design, measures_in
 from explorer.measures.measure import Case
@@ -84,6 +84,7 @@ def _view(_: State, i: int, share: float) -> Action:
                 cut=("x", "y", None)[i % 3],
                 level=share,
             ),
+            "prototype": PrototypeView(exploded=share),
             "drawn_as": ("schematic", "prototype", "6-4 twin")[i % 3],
             "singular": SingularView(ghost="δ2 = 0", strata=i > 2),
             "precision": PrecisionView(

@@ -50,7 +50,7 @@ LENGTHS = (
 IN_OTHER_UNITS = """
 paths: seconds, duration, request
 optimisation.request: starts
-view: density
+view.prototype: exploded, density
 view.forces: force, moment, scale
 view.precision: times, wanted, wanted_turn
 """

@@ -23,6 +23,7 @@ from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
+from explorer.app.state.view import PrototypeView
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
@@ -375,6 +376,7 @@ def in_base(scene: Placed, point: tuple[float, ...]) -> FloatArray:
     [
         (OPTIMAL, {}),
         (PRESS, {"machine": False}),
+        (PRESS, {"prototype": PrototypeView(exploded=0.5)}),
     ],
 )
 def test_tool_and_payload_are_not_drawn_where_there_are_none_or_they_are_hidden(

@@ -504,7 +504,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces() -> None:
     state = straight(
         Set("view.at", "tool"),
         Set("view.forces.weighed", "payload and legs"),
-        Set("view.density", 3000.0),
+        Set("view.prototype.density", 3000.0),
         force=(0.0, 0.0, -25.0),
     )
     state = Go().apply(Set("paths.kind", "planned").apply(state))

@@ -10,11 +10,12 @@ import msgspec
 import numpy as np
 import pytest
 from desk import Desk, by_name, thick, viewed
-from part_gaps import vertices_at
+from part_gaps import least_gap, vertices_at
 from services import StubJobs, services_for
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.bodies import Bodies, Legs
+from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs
+from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.prototype.building import (
     BUILD_FEED,
     FITTING,
@@ -26,6 +27,7 @@ from explorer.app.features.prototype.building import (
 from explorer.app.features.prototype.feature import (
     PrototypePanel,
     PrototypeScene,
+    places_of,
     trouble_of,
 )
 from explorer.app.features.prototype.work import (
@@ -43,14 +45,14 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import SetVariable
 from explorer.app.state.moves import SetPose, SetPosition
 from explorer.app.state.state import State, open_state
-from explorer.app.state.view import View
+from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.markup import status
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Payload
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.rgb import OUTLINE
-from explorer.motion.chains import LEGS
+from explorer.motion.chains import LEGS, ON_GUIDE, Places
 from explorer.page.widgets.assigning import Assigner
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.fitting import broken_joint_limits, buildability
@@ -81,7 +83,7 @@ def parts() -> Parts:
 def with_prototype(state: State | None = None, **changes: Any) -> State:
     """Return the state with the prototype drawn."""
     begin = open_state(OPTIMAL) if state is None else state
-    return viewed(begin, drawn_as="prototype", **changes)
+    return viewed(begin, drawn_as="prototype", prototype=PrototypeView(**changes))
 
 
 def states(count: int, **changes: Any) -> list[State]:
@@ -144,7 +146,7 @@ def test_meshes_are_assigned_only_when_the_design_has_changed(
         return len(assigner.assign(u for u in updates if u[1] in ("vertices", "faces")))
 
     assert meshes_assigned(with_prototype()) == 2 * PARTS
-    for state in (*states(3), with_prototype(density=7850.0)):
+    for state in (*states(3), with_prototype(exploded=0.5), with_prototype(density=7850.0)):
         assert meshes_assigned(state) == 0
     changed = SetVariable("b2", 2.7).apply(with_prototype())
     assert meshes_assigned(changed) > 0
@@ -177,6 +179,21 @@ def test_parts_replace_bodies_and_legs_and_follow_their_switches(
         assert hidden == kinds
 
 
+def test_flags_and_handle_are_drawn_only_with_assembled_parts(services: Services) -> None:
+    drawn = (Flags(services), DragHandle(services))
+    # One too tight for parts is drawn as the schematic mechanism.
+    tight = thick(with_prototype(exploded=0.5), 0.4)
+    for state, is_seen in (
+        (with_prototype(), True),
+        (with_prototype(exploded=0.5), False),
+        (tight, True),
+    ):
+        placed = placed_with_parts(services, viewed(state, handle=True, flags=True))
+        nodes = by_name(update for part in drawn for update in part.updates(placed))
+        assert {node["visible"] for node in nodes.values() if "visible" in node} == {is_seen}
+        assert all(bool(len(part.corners(placed))) == is_seen for part in drawn)
+
+
 def test_parts_of_legs_that_collide_are_coloured(services: Services) -> None:
     # The parts are still those of thinner legs, as while new ones are being made.
     placed_with_parts(services, with_prototype())
@@ -186,21 +203,31 @@ def test_parts_of_legs_that_collide_are_coloured(services: Services) -> None:
     assert red == {f"/prototype/{kind} {leg}" for kind in ("cylinder", "rod") for leg in (2, 3)}
 
 
-@pytest.mark.parametrize("state", states(2))
-def test_parts_are_within_the_corners(state: State, services: Services, parts: Parts) -> None:
+@pytest.mark.parametrize("state", states(2, exploded=1.0))
+def test_exploded_parts_of_a_leg_are_free_of_each_other_and_within_the_corners(
+    state: State, services: Services, parts: Parts
+) -> None:
     frame = Frame(state)
-    places = parts.prototype.places(frame.state.pose.position, frame.snapshot.rotation)
+    places = places_of(Placed(frame), parts)
     apart = {
         part.name: replace(part, body="base", vertices=part.vertices @ turn.T + origin)
         for part, origin, turn in zip(
             parts.prototype.parts, places.origin, places.rotation, strict=True
         )
     }
+    rest = Places(np.zeros((1, 3)), np.eye(3)[None])
     corners = PrototypeScene(services).corners(placed_with_parts(services, state))
     for part in apart.values():
         seen = Placed(frame).scale * part.vertices
         assert (seen >= corners.min(axis=0) - 1e-4).all()
         assert (seen <= corners.max(axis=0) + 1e-4).all()
+    least = 0.02 * OPTIMAL.reach
+    for leg in LEGS:
+        joint = "carriage" if leg in ON_GUIDE else "cross"
+        names = [f"{kind} {leg}" for kind in (joint, "cylinder", "rod", "ball")]
+        chain = [apart[name] for name in ("base", *names, "platform")]
+        gap, *which = least_gap(chain, rest, least)
+        assert gap == least, which
 
 
 # The feed
@@ -215,6 +242,7 @@ def test_parts_are_made_again_when_the_design_changes_and_not_else(
     for state in (
         with_prototype(),
         *states(3),
+        with_prototype(exploded=0.3),
         with_prototype(density=1.0),
     ):
         feed.follow(Frame(state))
@@ -340,7 +368,7 @@ def test_masses_and_counts_are_those_of_the_library(parts: Parts) -> None:
         "cross 1, 4",
         "ball 1, 2, 3, 4",
     ]
-    for density in (View().density, 7850.0):
+    for density in (PrototypeView().density, 7850.0):
         bill = bill_of_materials(parts.prototype, density)
         assert sum(line.count for line in lines) == len(bill.items) == PARTS
         assert sum(line.mass(density) for line in lines) == pytest.approx(1e3 * bill.mass, rel=1e-9)
@@ -370,7 +398,10 @@ def test_stock_holds_the_part(parts: Parts) -> None:
         assert across.max() * (1.0 - 1e-9) <= diameter <= np.hypot(*across)
 
 
-@pytest.mark.parametrize("density", [0.0, np.inf])
-def test_density_out_of_range_is_refused(density: float) -> None:
-    with pytest.raises(InputError, match="density"):
-        View(density=density)
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("exploded", -0.1), ("exploded", np.nan), ("density", 0.0), ("density", np.inf)],
+)
+def test_share_or_density_out_of_range_is_refused(name: str, value: float) -> None:
+    with pytest.raises(InputError, match="exploded view" if name == "exploded" else "density"):
+        PrototypeView(**{name: value})

@@ -21,7 +21,7 @@ from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
 from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import SetAngle, SetPose, SetPosition
-from explorer.app.state.view import View
+from explorer.app.state.view import PrototypeView, View
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.accessible.radii import with_radius
@@ -329,7 +329,9 @@ def test_scale_bar_has_the_length_that_it_names_at_any_distance(wide: Tab, facto
 
 
 @pytest.mark.draws
-def test_labels_and_axes_are_in_pictures(wide: Tab) -> None:
+def test_labels_and_axes_are_in_pictures_and_gone_while_the_prototype_is_exploded(
+    wide: Tab,
+) -> None:
     def opacity() -> FloatArray:
         wide.settle()
         pixels = wide.client.get_render(600, 640, transport_format="png", timeout=PATIENCE_SECONDS)
@@ -342,8 +344,11 @@ def test_labels_and_axes_are_in_pictures(wide: Tab) -> None:
     assert not bare[:-100].any()
     show(wide, replace(BARE, labels=True))
     assert (opacity()[:-100] > 200.0).any()
-    show(wide, View(drawn_as="prototype"))
+    together = View(drawn_as="prototype")
+    show(wide, together)
     assert len(labels_of(wide)) >= len(NAMES)
+    show(wide, replace(together, prototype=PrototypeView(exploded=0.5)))
+    assert labels_of(wide) == {}
 
 
 @pytest.mark.draws

@@ -182,7 +182,7 @@ def test_prototype_is_shown_and_exported(newcomer: Newcomer, data_tab: Tab) -> N
     assert newcomer.presses_for() == 2
     assert model_in(newcomer.export("Mechanism", "3MF")).count("<object ") > 5
     assert newcomer.presses_for() <= 3
-    density = data_tab.state.view.density
+    density = data_tab.state.view.prototype.density
     assert newcomer.export("Simulation", "MJCF") == export_simulation(OPTIMAL, density)
 
 

@@ -43,6 +43,7 @@ from explorer.app.state.moves import SetJoint, SetPose, SetPosition
 from explorer.app.state.view import (
     ForcesView,
     PrecisionView,
+    PrototypeView,
     SingularView,
     View,
     WorkspaceView,
@@ -211,12 +212,14 @@ SCENES = {
         panels=True,
         tab="Workspace",
     ),
+    # Half apart, so that each part is seen and where it belongs too.
     "prototype": Scene(
         actions=(
             bare(
                 flags=False,
                 labels=False,
                 drawn_as="prototype",
+                prototype=PrototypeView(exploded=0.5),
             ),
         ),
         panels=True,

@@ -64,6 +64,11 @@ class Placed:
         """Whether the schematic legs and bodies are drawn."""
         return self.floor is None
 
+    @property
+    def is_apart(self) -> bool:
+        """Whether parts are drawn apart, away from the points of the mechanism."""
+        return not self.is_schematic and self.frame.state.view.prototype.exploded > 0.0
+
     @cached_property
     def scale(self) -> float:
         """Scene units per design unit."""

@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from explorer.app.state.parts import LENGTHS
+from explorer.errors import InputError
 from explorer.measures.box import PositionSet
 from explorer.mechanism.configuration import Point
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.checks import STIFFEST, numbers, positive
-from explorer.numerics.number_text import UNITS, Unit
+from explorer.numerics.number_text import UNITS, Unit, format_apart, format_number
 
 ALUMINIUM = 2700.0
 """Density of aluminium, in kg/m³."""
@@ -48,6 +49,28 @@ class WorkspaceView:
     level: float | None = field(default=None, metadata=LENGTHS)
     flipped: bool = False
     tolerance: float | None = field(default=None, metadata=LENGTHS)
+
+
+@dataclass(frozen=True)
+class PrototypeView:
+    """How the prototype is shown.
+
+    Attributes:
+        exploded: How far the exploded view moves the parts apart, 0 to 1.
+        density: Density of all parts, in kg/m³.
+
+    Raises:
+        InputError: A share beyond 0 to 1, or a density that is not positive.
+    """
+
+    exploded: float = 0.0
+    density: float = ALUMINIUM
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.exploded <= 1.0:
+            low, high, got = format_apart((0.0, 1.0, self.exploded), 4, format_number)
+            raise InputError(f"the exploded view takes {low} to {high}; got {got}")
+        positive("the density, in kg/m³,", self.density)
 
 
 Weighed = Literal["none", "payload", "payload and legs"]
@@ -154,13 +177,12 @@ class View:
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
         ghosts: Whether the seven other assembly modes are drawn.
         tilts: Whether the greatest tilts at nodes over the workspace are drawn.
-        density: Density of all parts of the prototype, in kg/m³.
         warn_below: The length below which margins are warned of, in design units; distances
             are warned of below a share of it, see `explorer.measures.verdict`. None for a share of
             the reach.
 
     Raises:
-        InputError: The density or the warning length is not positive.
+        InputError: The warning length is not positive.
     """
 
     lengths: LengthName = "mm"
@@ -180,8 +202,8 @@ class View:
     swept: bool = False
     ghosts: bool = False
     tilts: bool = False
-    density: float = ALUMINIUM
     warn_below: float | None = field(default=None, metadata=LENGTHS)
+    prototype: PrototypeView = field(default_factory=PrototypeView)
     workspace: WorkspaceView = field(default_factory=WorkspaceView, metadata=LENGTHS)
     singular: SingularView = field(default_factory=SingularView)
     forces: ForcesView = field(default_factory=ForcesView)
@@ -197,6 +219,5 @@ class View:
         return self.drawn_as == "6-4 twin"
 
     def __post_init__(self) -> None:
-        positive("the density, in kg/m³,", self.density)
         if self.warn_below is not None:
             positive("the warning length", self.warn_below)

@@ -101,7 +101,7 @@ def _weights_request(frame: Frame) -> tuple[Design, float] | None:
     view = frame.state.view
     if view.forces.weighed != "payload and legs":
         return None
-    return without_name(frame.state.design), view.density
+    return without_name(frame.state.design), view.prototype.density
 
 
 WEIGHTS_FEED = FeedOf(weights_of_parts, _weights_request)
@@ -130,7 +130,7 @@ class Loads:
     def command(self, topic: LoadTopic, state: State) -> str:
         """Return the command that gives the answer in a state."""
         loaded = self.of(Frame(state))
-        density = None if loaded.own is None else state.view.density
+        density = None if loaded.own is None else state.view.prototype.density
         return load_command(topic, loaded, density)
 
 

@@ -49,6 +49,7 @@ class ErrorEllipsoidScene(ScenePart):
         precision = self._loads.precision(placed.frame)
         shown = (
             placed.frame.state.view.precision.ellipsoid
+            and not placed.is_apart
             and precision.has_errors
             and precision.is_regular
         )
@@ -86,7 +87,7 @@ class DeflectedScene(ScenePart):
         view = placed.frame.state.view
         shown = (
             view.precision.deflected
-            and not view.is_twin
+            and not (view.is_twin or placed.is_apart)
             and is_elastic(precision.loaded.design)
             and precision.is_regular
         )

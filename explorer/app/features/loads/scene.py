@@ -219,9 +219,9 @@ class LoadHandle(ScenePart):
 
 
 def is_visible(placed: Placed) -> bool:
-    """Whether forces are drawn: of the mechanism itself."""
+    """Whether forces are drawn: of the mechanism itself, whose parts are in place."""
     view = placed.frame.state.view
-    return view.forces.shown and not view.is_twin
+    return view.forces.shown and not view.is_twin and not placed.is_apart
 
 
 def has_force(placed: Placed) -> bool:

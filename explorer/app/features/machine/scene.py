@@ -99,10 +99,14 @@ def ball_radius(mass: float) -> float:
 def _has_tool(placed: Placed) -> bool:
     """Whether the design has a tool, and it is drawn."""
     tool = placed.frame.state.design.tool
-    return placed.frame.state.view.machine and any((*tool.position, *tool.quaternion[1:]))
+    return _is_visible(placed) and any((*tool.position, *tool.quaternion[1:]))
 
 
 def _has_payload(placed: Placed) -> bool:
     """Whether the design has a payload with a mass, and it is drawn."""
-    state = placed.frame.state
-    return state.view.machine and state.design.payload.mass_kg > 0.0
+    return _is_visible(placed) and placed.frame.state.design.payload.mass_kg > 0.0
+
+
+def _is_visible(placed: Placed) -> bool:
+    # Apart, the platform is not where its points are.
+    return placed.frame.state.view.machine and not placed.is_apart

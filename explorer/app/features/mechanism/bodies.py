@@ -283,7 +283,7 @@ class Flag:
 
     def updates(self, placed: Placed, line: Extent, plane: Extent, size: float) -> Updates:
         """Yield the updates that draw the flag; `size` scales its thicknesses."""
-        levels, visible = placed.frame.verdict.levels, placed.frame.state.view.flags
+        levels, visible = placed.frame.verdict.levels, _are_visible(placed)
         point, along, across = (proximity_colour(levels[index]) for index in self._deltas)
         yield from show(visible, self._point, self._line, self._patch)
         yield self._point, "color", point
@@ -328,11 +328,16 @@ class Flags(ScenePart):
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of both planes where no incidence is near."""
-        if not placed.frame.state.view.flags:
+        if not _are_visible(placed):
             return NO_POINTS
         rotation = placed.frame.snapshot.rotation
         platform = placed.points["b4"] + _platform_extent(placed).corners @ rotation.T
         return np.concatenate([_base_extent(placed).corners, platform])
+
+
+def _are_visible(placed: Placed) -> bool:
+    # They would stand among parts that are drawn apart.
+    return placed.frame.state.view.flags and not placed.is_apart
 
 
 def _base_extent(placed: Placed) -> Extent:

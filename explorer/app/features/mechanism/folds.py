@@ -146,7 +146,8 @@ class Leaves(ScenePart):
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw leaves and arcs of this frame."""
         state = placed.frame.state
-        shown = state.view.leaves
+        # They would stand among parts that are drawn apart.
+        shown = state.view.leaves and not placed.is_apart
         yield from show(shown, *self._leaves, *self._wedges, self._edges, self._arcs)
         yield from show(shown and state.view.labels, *self._labels)
         if not shown:

@@ -158,7 +158,8 @@ def approaches(placed: Placed, hovered: int | None) -> tuple[Approach, Approach,
         return Approach(
             level,
             1.0 if is_hovered else presence,
-            is_on,
+            # Like the flags, it would stand among parts that are drawn apart.
+            is_on and not placed.is_apart,
             index + 1 == nearest,
             level == 0.0 and gaps.lengths[index] <= CLOSED * reach,
             ends[index] if farthest[index] <= FARTHEST * reach else None,

@@ -37,7 +37,8 @@ class Labels(ScenePart):
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the labels of this frame."""
-        shown = placed.frame.state.view.labels
+        # The points stay where they are when the parts about them move apart.
+        shown = placed.frame.state.view.labels and not placed.is_apart
         points = placed.points | placed.platform_points
         for name, handle in self._handles.items():
             yield handle, "visible", shown
@@ -68,7 +69,7 @@ class DragHandle(ScenePart):
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that keep the gizmo on the platform."""
         state = placed.frame.state
-        yield self.handle, "visible", state.view.handle
+        yield self.handle, "visible", _is_handle_visible(placed)
         # Put back, the gizmo would lose a movement that the platform is yet to follow.
         if self.handle.update_timestamp != self._followed:
             return
@@ -81,10 +82,15 @@ class DragHandle(ScenePart):
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the tips of the three arrows."""
-        if not placed.frame.state.view.handle:
+        if not _is_handle_visible(placed):
             return NO_POINTS
         return placed.point + ARROW_LENGTH * placed.frame.snapshot.rotation.T
 
     def _follow(self, state: State) -> SetPose:
         self._followed = self.handle.update_timestamp
         return SetPose(self.pose(state))
+
+
+def _is_handle_visible(placed: Placed) -> bool:
+    # Apart, the platform is not where the handle would move it.
+    return placed.frame.state.view.handle and not placed.is_apart

@@ -112,7 +112,7 @@ class PathRunner(Runner):
         number, design, paths = self._request, state.design, Paths.of(state)
         tool, view = state.tool, state.view
         load = state.load if paths.holds_load else None
-        weighed, density = view.forces.weighed, view.density
+        weighed, density = view.forces.weighed, view.prototype.density
 
         def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1

@@ -33,7 +33,7 @@ def request_for(state: State) -> DrivesRequest | None:
     if journey is None or paths.drives == "off":
         return None
     duration = paths.duration if paths.drives == "duration" else None
-    density = state.view.density
+    density = state.view.prototype.density
     return journey.design, TimedPath(journey.poses, duration, journey.tool, density)
 
 

@@ -14,6 +14,7 @@ from explorer.app.features.prototype.building import BUILD_FEED, BuildVerdict, s
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, PartsFeed, parts_to_draw
 from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.ranges import Span
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH
 from explorer.app.session.session import Who
@@ -24,10 +25,11 @@ from explorer.errors import ExplorerError
 from explorer.measures.box import corners_of
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.mechanism.rgb import BALL, CARRIAGE, OUTLINE, PLATFORM_BODY, RAIL, ROD, TUBE, Rgb
-from explorer.motion.chains import BODIES, LEGS
+from explorer.motion.chains import BODIES, LEGS, Places
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.page.widgets.assigning import Updates
+from explorer.prototype.assembly import exploded_offsets
 from explorer.prototype.fitting import broken_joint_limits
 
 # Format of each file by its name on the page, and end of the name of the file.
@@ -40,7 +42,7 @@ ASSEMBLIES = {
 
 
 class PrototypePanel:
-    """Whether the machine can be built; controls that draw and list its parts."""
+    """Whether the machine can be built; controls that draw, explode and list its parts."""
 
     def __init__(self, services: Services) -> None:
         gui, self._feed = services.gui, services.get(PARTS_FEED)
@@ -60,10 +62,16 @@ class PrototypePanel:
         self._trouble = gui.add_html("", visible=False)
         self._folder = gui.add_folder("Parts", visible=False)
         with self._folder:
+            controls.slider(
+                "Exploded",
+                "The exploded view: 0 together, 1 each part by itself.",
+                "view.prototype.exploded",
+                Span(0.0, 1.0, 0.01),
+            )
             controls.number(
                 "Density (kg/m³)",
                 "Density of all parts. Aluminium 2700, steel 7850, printed PLA 1240.",
-                "view.density",
+                "view.prototype.density",
                 least=1.0,
                 step=1.0,
             )
@@ -80,7 +88,7 @@ class PrototypePanel:
         parts = parts_to_draw(feed)
         yield self._folder, "visible", parts is not None
         if parts is not None:
-            density = frame.state.view.density
+            density = frame.state.view.prototype.density
             yield self._bill, "content", parts_table(parts, density)
 
 
@@ -140,7 +148,7 @@ def _send_assembly(services: Services, name: str, who: Who) -> None:
 def _send_simulation(services: Services, _: str, who: Who) -> None:
     state = services.session.latest_state()
     file = f"{state.design.name}-simulation.xml"
-    arguments = state.design, state.view.density
+    arguments = state.design, state.view.prototype.density
     services.downloads.compute(who, file, work.export_simulation, arguments)
 
 
@@ -167,7 +175,7 @@ ON_BODIES = ("base", "platform")
 
 
 class PrototypeScene(ScenePart):
-    """The parts, moved as rigid bodies.
+    """The parts, assembled or exploded, moved as rigid bodies.
 
     Each part has a node from the start, which gets a mesh when the design changes and a place in
     each frame.
@@ -193,8 +201,7 @@ class PrototypeScene(ScenePart):
         if parts is None:
             return
         names = [part.name for part in parts.prototype.parts]
-        frame, platform = placed.frame, names.index("platform")
-        places = parts.prototype.places(frame.state.pose.position, frame.snapshot.rotation)
+        places, platform = places_of(placed, parts), names.index("platform")
         origins = placed.scale * places.origin
         turns = quaternion_from_rotation(places.rotation).tolist()
         meshes = parts.meshes_in(placed.scale)
@@ -219,14 +226,24 @@ class PrototypeScene(ScenePart):
         parts = parts_to_draw(self._feed)
         if parts is None:
             return NO_POINTS
-        frame, seen = placed.frame, list[FloatArray]()
-        places = parts.prototype.places(frame.state.pose.position, frame.snapshot.rotation)
+        places, seen = places_of(placed, parts), list[FloatArray]()
         for (vertices, _), origin, rotation in zip(
             parts.meshes, places.origin, places.rotation, strict=True
         ):
             corners = corners_of(np.stack([vertices.min(axis=0), vertices.max(axis=0)]))
             seen.append(placed.scale * (corners @ rotation.T + origin))
         return np.concatenate(seen)
+
+
+def places_of(placed: Placed, parts: Parts) -> Places:
+    """Return where the parts are drawn, in their order and in design units."""
+    frame = placed.frame
+    places = parts.prototype.places(frame.state.pose.position, frame.snapshot.rotation)
+    share = frame.state.view.prototype.exploded
+    if share == 0.0:
+        return places
+    away = share * exploded_offsets(parts.prototype, places)
+    return Places(places.origin + away, places.rotation)
 
 
 PROTOTYPE = Feature(
