@@ -12,7 +12,6 @@ from typing import TypeAlias
 
 from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.workspace.work import LIVE_TOLERANCE
-from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
 from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
@@ -21,7 +20,6 @@ from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
@@ -50,7 +48,7 @@ class ComparedRequest:
 
 @dataclass(frozen=True, eq=False)
 class ComparedDrawing:
-    """A design measured and drawn; lengths in design units, the outline of shape (n, 2, 3).
+    """A design measured and drawn; lengths in design units.
 
     The measurements are None if they could not be computed, the shell if no workspace was
     requested or it is empty. The problem says why something is missing.
@@ -59,7 +57,6 @@ class ComparedDrawing:
     request: ComparedRequest
     measurements: Measurements | None
     shell: Shell | None
-    outline: FloatArray
     problem: str | None = None
 
     def offset(self, at: Point) -> FloatArray:
@@ -83,8 +80,7 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
                 shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
         problem = str(error)
-    lines = outline(evaluate(design, design.home_pose))
-    return ComparedDrawing(request, measurements, shell, lines, problem)
+    return ComparedDrawing(request, measurements, shell, problem)
 
 
 _kept_case = lru_cache(maxsize=CACHED)(Case)

@@ -280,14 +280,10 @@ class DesignsPanel:
         acts: dict[str, Callable[[LibraryFile, Who], None]] = {
             "open": self._open,
             "duplicate": self._duplicate,
-            "delete": lambda row, _: self._set_asked(row.name),
-            "confirm": self._delete,
-            "keep": lambda _, __: self._set_asked(None),
+            "delete": self._delete,
         }
         for name, act in acts.items():
             services.buttons.on(f"designs.{name}", partial(self._press, act))
-        # Name of the design that the page asks whether to delete.
-        self.asked: str | None = None
         self._listed: tuple[object, ...] = ()
         self._markup = ""
 
@@ -298,10 +294,10 @@ class DesignsPanel:
         _, words = saved_words(live, self._saved.find(live.name))
         yield self.status, "content", note(words)
         view = frame.state.view
-        listed = self._saved.entries, base.name, self.asked, view.lengths
+        listed = self._saved.entries, base.name, view.lengths
         if listed != self._listed:
             self._listed = listed
-            self._markup = list_designs(rows_of(self._saved.entries), base.name, self.asked, view)
+            self._markup = list_designs(rows_of(self._saved.entries), base.name, view)
         yield self.list, "content", self._markup
         deleted = self._saved.last_deleted
         yield self.restore, "visible", deleted is not None
@@ -323,13 +319,8 @@ class DesignsPanel:
             self._saved.copy(row.design, who)
 
     def _delete(self, row: LibraryFile, who: Who) -> None:
-        if row.name == self.asked:
-            self._set_asked(None)
+        if row.name not in PRESETS:
             self._saved.delete(row.name, who)
-
-    def _set_asked(self, name: str | None) -> None:
-        self.asked = name if name not in PRESETS else None
-        self._session.redraw()
 
     def _press(
         self, act: Callable[[LibraryFile, Who], None], name: str, client: viser.ClientHandle
@@ -345,22 +336,17 @@ def rows_of(entries: Sequence[LibraryFile]) -> tuple[LibraryFile, ...]:
     return (*entries, *(LibraryFile(name, "", design) for name, design in PRESETS.items()))
 
 
-def list_designs(rows: Sequence[LibraryFile], current: str, asked: str | None, view: View) -> str:
-    """Return the list in HTML, with the buttons of each row.
-
-    The open design is marked; the row of the design asked for asks whether to delete it.
-    """
+def list_designs(rows: Sequence[LibraryFile], current: str, view: View) -> str:
+    """Return the list in HTML, with the buttons of each row; the open design is marked."""
     head = (
         '<div class="ex-row ex-dim ex-small"><span class="ex-fill">Designs, the last saved on top'
         '</span><span class="ex-reach">reach |a3|</span><span class="ex-acts"></span></div>'
     )
-    lines = "".join(
-        _line(row, view, is_current=row.name == current, is_asked=row.name == asked) for row in rows
-    )
+    lines = "".join(_line(row, view, is_current=row.name == current) for row in rows)
     return box(head, f'<div class="ex-designs">{lines}</div>')
 
 
-def _line(row: LibraryFile, view: View, *, is_current: bool, is_asked: bool) -> str:
+def _line(row: LibraryFile, view: View, *, is_current: bool) -> str:
     if row.design is None:
         problem = escape(row.problem or "")
         name = (
@@ -380,9 +366,6 @@ def _line(row: LibraryFile, view: View, *, is_current: bool, is_asked: bool) -> 
         reach = view.unit_for(row.design).text(row.design.reach)
         copy = _link("duplicate", row.name, "Duplicate")
     delete = "" if row.name in PRESETS else _link("delete", row.name, "Delete")
-    if is_asked:
-        reach = "Delete it?"
-        copy, delete = _link("confirm", row.name, "Delete"), _link("keep", row.name, "Keep")
     here = " is-here" if is_current else ""
     return (
         f'<div class="ex-row{here}">{name}<span class="ex-reach">{reach}</span>'
