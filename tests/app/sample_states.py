@@ -86,10 +86,11 @@ def _view(_: State, i: int, share: float) -> Action:
             ),
             "prototype": PrototypeView(exploded=share),
             "drawn_as": ("schematic", "prototype", "6-4 twin")[i % 3],
-            "singular": SingularView(strata=i > 2),
+            "singular": SingularView(ghost="δ2 = 0", strata=i > 2),
             "precision": PrecisionView(
                 ellipsoid=i > 2,
                 deflected=i > 1,
+                times=None if i == 0 else 10.0,
                 over=("pose", "box", "workspace")[i % 3],
                 wanted=None if i == 0 else 0.1 + share,
             ),

@@ -72,8 +72,8 @@ def test_press_of_a_client_is_one_step(running: Running, tab: SocketTab) -> None
     number = session.history.step.number
     # The same press again is another press.
     for on in (True, False, True):
-        tab.update(*press_update(running, "compare.overlay"))
-        wait_for(lambda on=on: Compared.of(session.state).look.overlay is on)
+        tab.update(*press_update(running, "compare.turn", "Outlines"))
+        wait_for(lambda on=on: Compared.of(session.state).look.outlines is on)
     assert session.history.step.number == number + 3
     assert session.wait_until_idle()
     assert ("compare.open", SLOTS[0]) in presses_in(running)
@@ -131,8 +131,8 @@ def test_press_that_nothing_offers_does_nothing(running: Running, tab: SocketTab
     ):
         tab.update(inbox, text)
     # Presses are handled in their order: once this one is done, so are the others.
-    tab.update(*press_update(running, "compare.overlay"))
-    wait_for(lambda: Compared.of(session.state).look.overlay)
+    tab.update(*press_update(running, "compare.turn", "Outlines"))
+    wait_for(lambda: Compared.of(session.state).look.outlines)
     assert session.history.step.number == before + 1
     session.do(UNDO)
 

@@ -253,7 +253,7 @@ def test_table_compares_loads_of_the_designs_that_have_them() -> None:
     assert rows["load share at home %"][2] == rows["held volume cm³"][2] == "–"
 
 
-def test_drawing_has_the_workspace_at_home() -> None:
+def test_drawing_has_the_workspace_at_home_and_the_points_of_the_design() -> None:
     drawing = draw_compared(ComparedRequest(INITIAL, drawn=True))
     assert drawing.problem is None
     assert drawing.shell is not None
@@ -263,6 +263,9 @@ def test_drawing_has_the_workspace_at_home() -> None:
         np.array([drawing.measurements[f"exact_extent_{axis}"] for axis in "xyz"]),
         abs=0.01 * INITIAL.reach,
     )
+    ends = drawing.outline.reshape(-1, 3)
+    for point in ((0.0, 0.0, 0.0), (*INITIAL.a3, 0.0), INITIAL.home_pose.position):
+        assert np.abs(ends - np.array(point)).max(axis=1).min() < 1e-9
     assert draw_compared(ComparedRequest(INITIAL)).shell is None
 
 
@@ -326,7 +329,7 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     services: Services, feeds: list[CompareFeed], jobs: StubJobs
 ) -> None:
     large = msgspec.structs.replace(INITIAL, unit_mm=25.0)
-    state = compared(large, look=CompareView(overlay=True))
+    state = compared(large, look=CompareView(overlay=True, outlines=True))
     follow(feeds, state)
     scenes = [services.get(part) for part in SCENES]
     assigner = Assigner(services.server)
@@ -340,7 +343,8 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
         for handle, name, value in scene.updates(placed)
         if name == "visible" and value
     }
-    assert {"/compared/live/workspace", "/compared/A/workspace"} <= {*shown}
+    assert {"/compared/live/workspace", "/compared/A/workspace", "/compared/A/outline"} <= {*shown}
+    assert "/compared/live/outline" not in shown
     drawing = drawing_in(1, feeds[1])
     assert drawing is not None
     assert drawing.shell is not None
@@ -379,7 +383,7 @@ def test_panel_pins_opens_unpins_and_switches(
         "nothing is pinned as C",
     ]
     assert Compared.of(desk.state).pinned == (own, variant(7), None)
-    desk.press(buttons, "compare.overlay")
+    desk.press(buttons, "compare.turn", "Overlay workspaces")
     assert Compared.of(desk.state).look == CompareView(overlay=True)
     desk.press(buttons, "compare.unpin", "A")
     assert Compared.of(desk.state).pinned == (None, variant(7), None)

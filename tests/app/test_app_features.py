@@ -462,6 +462,7 @@ UNITS = re.compile(
 
 WITHOUT_UNIT = {
     "Starts": "a count of designs",
+    "Magnification (0: automatic)": "a ratio",
     "Exploded": "a share, from 0 to 1",
     "Go to step": "the number of a step",
     "Number of designs": "a count of designs",

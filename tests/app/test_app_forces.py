@@ -356,12 +356,20 @@ def test_ellipsoid_is_that_of_the_covariance(services: Services) -> None:
     )
 
 
-def test_deflected_shape_is_the_linear_motion_magnified(services: Services) -> None:
-    state = state_with(deflected=True)
+@pytest.mark.parametrize("times", [None, 20.0])
+def test_deflected_shape_is_the_linear_motion_magnified(
+    services: Services, times: float | None
+) -> None:
+    state = state_with(deflected=True, times=times)
     placed = Placed(Frame(state))
     precision = services.get(Loads).precision(placed.frame)
     drawn = by_name(DeflectedScene(services).updates(placed))
     magnified = magnification(placed, precision)
+    assert times in (None, magnified)
+    # One that leaves the scene is limited.
+    wide = Placed(Frame(state_with(deflected=True, times=1e12)))
+    balls = by_name(DeflectedScene(services).updates(wide))["/precision/balls"]
+    assert np.abs(balls["batched_positions"]).max() < 200.0
     v, w = precision.deflection[:3], precision.deflection[3:]
     tool = placed.on_platform(state.design.tool.position)
     names = list(placed.platform_points)
@@ -371,7 +379,9 @@ def test_deflected_shape_is_the_linear_motion_magnified(services: Services) -> N
     np.testing.assert_allclose(balls, moved, atol=1e-5)
 
 
-@pytest.mark.parametrize("values", [{"wanted": -1.0}, {"wanted": 1e-8}, {"wanted_turn": math.inf}])
+@pytest.mark.parametrize(
+    "values", [{"times": 0.0}, {"wanted": -1.0}, {"wanted": 1e-8}, {"wanted_turn": math.inf}]
+)
 def test_precision_of_the_view_that_is_not_positive_is_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="must be"):
         PrecisionView(**values)

@@ -52,7 +52,7 @@ paths: seconds, duration, request
 optimisation.request: starts
 view.prototype: exploded, density
 view.forces: force, moment, scale
-view.precision: wanted, wanted_turn
+view.precision: times, wanted, wanted_turn
 """
 """Numbers of the same parts that are no lengths in design units."""
 

@@ -37,6 +37,7 @@ from explorer.app.features.singularity.scene import (
     BallScene,
     EllipsoidScene,
     FreeMotion,
+    NearestGhost,
     show_button,
 )
 from explorer.app.scene.placing import Placed
@@ -145,7 +146,9 @@ def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> 
 
 
 @pytest.mark.parametrize("state", random_states(2))
-def test_distances_are_those_of_the_nearest_poses(state: State) -> None:
+def test_distances_and_their_ghosts_are_those_of_the_nearest_poses(
+    services: Services, state: State
+) -> None:
     nearest = nearest_singularities(OPTIMAL, state.pose)
     words = plain(distance_table(Frame(state)))
     distances = [each.distance for each in nearest]
@@ -158,6 +161,22 @@ def test_distances_are_those_of_the_nearest_poses(state: State) -> None:
         assert [number(text) for text in row.groups()] == pytest.approx(
             expected, rel=1e-2, abs=0.06
         )
+    scene = NearestGhost(services)
+    least = int(np.argmin(distances))
+    for ghost, index in (("δ1 = 0", 0), ("δ2 = 0", 1), ("δ3 = 0", 2), ("nearest", least)):
+        placed = Placed(Frame(viewed(state, ghost=ghost)))
+        drawn = by_name(scene.updates(placed))
+        plate, ways = drawn["/nearest/platform"], drawn["/nearest/ways"]["points"]
+        assert plate["visible"] is True
+        assert plate["wxyz"] == nearest[index].pose.quaternion
+        lengths = np.linalg.norm(ways[:, 1] - ways[:, 0], axis=1) / placed.scale
+        assert float(np.sqrt((lengths**2).mean())) == pytest.approx(distances[index], rel=1e-4)
+        assert f"δ{index + 1} = 0" in drawn["/nearest/label"]["text"]
+        there = Configuration(
+            OPTIMAL, nearest[index].pose.position, nearest[index].pose.rotation
+        ).points
+        ends = placed.scale * np.array([there.b1, there.b2, there.b3, there.b4])
+        np.testing.assert_allclose(ways[:, 1], ends, rtol=1e-4, atol=1e-4)
 
 
 def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
@@ -168,6 +187,10 @@ def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
     desk.press(services.buttons, "singular.go", "2")
     assert desk.state.pose == expected
     assert Frame(desk.state).snapshot.stratum == (4, 2, 3, 1)
+    drawn = by_name(
+        NearestGhost(services).updates(Placed(Frame(viewed(desk.state, ghost="δ2 = 0"))))
+    )
+    assert not any(each["visible"] for each in drawn.values())
     with pytest.raises(InputError, match="δ2 = 0 already: lines a1a2 and b2b3 meeting"):
         work.GoToSingularity(2).apply(viewed(work.GoToStratum((2, 1, 4, 3)).apply(desk.state)))
 
@@ -180,7 +203,7 @@ def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
 def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
     services: Services, desk: Desk, state: State
 ) -> None:
-    shown = viewed(state, strata=True, ellipsoid="speed", ball=True)
+    shown = viewed(state, ghost="nearest", strata=True, ellipsoid="speed", ball=True)
     frame = Frame(shown)
     words = plain(summary(frame))
     for index in incidences(frame.snapshot.stratum):
@@ -196,7 +219,7 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
     motion = FreeMotion(services)
     list(motion.updates(placed))
     desk.press(services.buttons, "singular.show", found.turns[0].incidence)
-    for scene in (EllipsoidScene(services), BallScene(services), motion):
+    for scene in (EllipsoidScene(services), BallScene(services), NearestGhost(services), motion):
         for _, name, value in scene.updates(placed):
             if name in ("points", "scale", "position", "wxyz", *BATCHED):
                 assert np.isfinite(np.asarray(value, dtype=np.float64)).all()

@@ -137,7 +137,9 @@ SCENES = {
     # Tall, so that the whole diagram is in it.
     "strata": Scene(
         pose=Pose.of_yaw_pitch_roll((10, 5, 9), (-73.1, 12, 0)),
-        actions=(Set("view", View(handle=False, singular=SingularView(strata=True))),),
+        actions=(
+            Set("view", View(handle=False, singular=SingularView(strata=True, ghost="nearest"))),
+        ),
         panels=True,
         tab="More",
         size=(1280, 1200),

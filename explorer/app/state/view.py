@@ -108,17 +108,19 @@ class PrecisionView:
     Attributes:
         ellipsoid: Whether the ellipsoid of the tool's RMS error is drawn.
         deflected: Whether the mechanism is drawn as the load deflects it.
+        times: Magnification of the drawn deflection; None for one that suits it.
         over: Positions of the budget: the present one, the box of the design, or the workspace.
         wanted: Largest displacement of the tool that the tolerances may cause, in mm; None for a
             ranking of the tolerances as they are.
         wanted_turn: Largest turn of the tool likewise, in degrees; None for any.
 
     Raises:
-        InputError: A wanted precision that is not positive.
+        InputError: A magnification or a wanted precision that is not positive.
     """
 
     ellipsoid: bool = False
     deflected: bool = False
+    times: float | None = None
     budget: bool = False
     over: PositionSet = "pose"
     wanted: float | None = None
@@ -127,6 +129,7 @@ class PrecisionView:
 
     def __post_init__(self) -> None:
         for name, value in (
+            ("magnification", self.times),
             ("wanted displacement", self.wanted),
             ("wanted turn", self.wanted_turn),
         ):
@@ -137,6 +140,7 @@ class PrecisionView:
 LengthName = Literal["mm", "design units"]
 Coordinates = Literal["position", "lengths", "folds"]
 DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
+Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
 Gain = Literal["none", "speed", "force"]
 
 
@@ -145,10 +149,12 @@ class SingularView:
     """How singularities are shown.
 
     Attributes:
+        ghost: Which of the nearest singular poses is drawn.
         strata: Whether the diagram of the strata is drawn.
         ellipsoid: Which ellipsoid is drawn at the point, that of speeds or that of forces.
     """
 
+    ghost: Ghost = "none"
     strata: bool = True
     ellipsoid: Gain = "none"
     ball: bool = False

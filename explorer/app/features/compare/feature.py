@@ -73,12 +73,26 @@ class Unpin(Action):
         return with_value(state, f"compared.pinned.{self.slot}", None)
 
 
-OVERLAY = StateCommand(
-    "Compare › Overlay workspaces",
-    "Draw the workspaces at home over one another, in the designs' colours, to true size.",
-    *turn("compared.look.overlay", "Overlay workspaces"),
-    lambda state: not Compared.of(state).is_empty,
-)
+LOOKS = {
+    label: StateCommand(
+        f"Compare › {label}",
+        does,
+        *turn(f"compared.look.{name}", label),
+        lambda state: not Compared.of(state).is_empty,
+    )
+    for label, name, does in (
+        (
+            "Overlay workspaces",
+            "overlay",
+            "Draw the workspaces at home over one another, in the designs' colours, to true size.",
+        ),
+        (
+            "Outlines",
+            "outlines",
+            "Outline base, legs and platform of the pinned designs in their home poses.",
+        ),
+    )
+}
 
 
 def _open(slot: int, state: State) -> Open:
@@ -109,9 +123,7 @@ class ComparePanel:
         self._library = None if services.user_data is None else services.get(SavedDesigns)
         self.html = services.gui.add_html("")
         self._add_buttons(services)
-        self._overlay = Chips(
-            services.buttons, services.session, "compare.overlay", "", {"": OVERLAY}
-        )
+        self._looks = Chips(services.buttons, services.session, "compare.turn", "", LOOKS)
         self._key: tuple[object, ...] = ()
         self._content = ""
 
@@ -161,7 +173,7 @@ class ComparePanel:
         )
         return box(
             f'<div class="ex-flow ex-before">{pins}<span class="ex-divider"></span>'
-            f"{self._overlay.buttons(state)}</div>",
+            f"{self._looks.buttons(state)}</div>",
             table(columns),
             remarks,
         )

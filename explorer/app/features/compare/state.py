@@ -17,9 +17,10 @@ Pinned: TypeAlias = tuple[Design | None, Design | None, Design | None]
 
 @dataclass(frozen=True)
 class CompareView:
-    """How designs are compared in the scene: by their workspaces over one another, or not."""
+    """How designs are compared in the scene: by their workspaces over one another, by outlines."""
 
     overlay: bool = False
+    outlines: bool = False
 
 
 @dataclass(frozen=True)

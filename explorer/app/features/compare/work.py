@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.workspace.work import LIVE_TOLERANCE
+from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
 from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
@@ -20,6 +21,7 @@ from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
+from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
@@ -48,7 +50,7 @@ class ComparedRequest:
 
 @dataclass(frozen=True, eq=False)
 class ComparedDrawing:
-    """A design measured and drawn; lengths in design units.
+    """A design measured and drawn; lengths in design units, the outline of shape (n, 2, 3).
 
     The measurements are None if they could not be computed, the shell if no workspace was
     requested or it is empty. The problem says why something is missing.
@@ -57,6 +59,7 @@ class ComparedDrawing:
     request: ComparedRequest
     measurements: Measurements | None
     shell: Shell | None
+    outline: FloatArray
     problem: str | None = None
 
     def offset(self, at: Point) -> FloatArray:
@@ -80,7 +83,8 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
                 shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
         problem = str(error)
-    return ComparedDrawing(request, measurements, shell, problem)
+    lines = outline(evaluate(design, design.home_pose))
+    return ComparedDrawing(request, measurements, shell, lines, problem)
 
 
 _kept_case = lru_cache(maxsize=CACHED)(Case)

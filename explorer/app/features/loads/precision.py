@@ -87,6 +87,14 @@ class PrecisionPanel:
                 "Draw platform and legs as the load deflects them, magnified.",
                 "view.precision.deflected",
             )
+            controls.number(
+                "Magnification (0: automatic)",
+                "How many times larger the deflection is drawn than it is.",
+                _zero_for_none("view.precision.times"),
+                least=0.0,
+                step=1.0,
+                visible=lambda state: state.view.precision.deflected,
+            )
         with gui.add_folder("Budget of tolerances"):
             controls.checkbox(
                 "What each tolerance costs",

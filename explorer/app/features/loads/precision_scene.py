@@ -24,7 +24,7 @@ from explorer.statics.loaded import ToolPrecision
 ERROR: Rgb = (176, 60, 120)
 DEFLECTED: Rgb = (222, 110, 20)
 PLATE_OPACITY = 0.7
-# Sizes over the reach that a magnification gives the longest semi-axis and the largest
+# Sizes over the reach that an automatic magnification gives the longest semi-axis and the largest
 # displacement, and the shortest semi-axis that is drawn as a share of the longest.
 ELLIPSOID_SIZE, DEFLECTION_SIZE, THINNEST = 0.18, 0.25, 0.01
 # Pieces of a drawn strut, and its radius in scene units.
@@ -33,8 +33,8 @@ PIECES, RADIUS = 12, 0.1
 # tip: (3 u² − u³) / 2 at the share u of its length.
 U = np.linspace(0.0, 1.0, PIECES + 1)
 ALONG = np.stack([0.5 * (3.0 * U**2 - U**3), U, U], axis=1)
-# Largest magnification.
-LARGEST_TIMES = 1e12
+# Largest automatic magnification, and largest drawn displacement over the reach.
+LARGEST_TIMES, FARTHEST = 1e12, 5.0
 
 
 class ErrorEllipsoidScene(ScenePart):
@@ -143,7 +143,11 @@ def magnification(placed: Placed, precision: ToolPrecision) -> float:
     reach = placed.frame.state.design.reach
     points = np.array([*placed.points.values(), tool_point(placed)])
     largest = float(np.linalg.norm(_displacements(precision, placed, points), axis=1).max())
-    return fitting_times(largest / (DEFLECTION_SIZE * reach))
+    chosen = placed.frame.state.view.precision.times
+    if chosen is None:
+        return fitting_times(largest / (DEFLECTION_SIZE * reach))
+    # Beyond this the drawing would leave the scene.
+    return min(chosen, FARTHEST * reach / largest) if largest > 0.0 else chosen
 
 
 def fitting_times(share: float) -> float:

@@ -19,7 +19,7 @@ from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import length_span
 from explorer.app.state.folds import FIRST_FOLD
 from explorer.app.state.frame import Frame
-from explorer.app.state.view import Gain
+from explorer.app.state.view import Gain, Ghost
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure, press_button
 from explorer.app.widgets.chips import StateCommand
@@ -61,6 +61,13 @@ class SingularityPanel:
         for incidence in (1, 2, 3):
             buttons.offer(f"Singularity › Go to δ{incidence} = 0", GO_HINT, GO, str(incidence))
         with gui.add_folder("More", expand_by_default=False):
+            controls.dropdown(
+                "Ghost",
+                "Draw the nearest pose with an incidence, and the displacements of b1 to b4 to it.",
+                get_args(Ghost),
+                "view.singular.ghost",
+                is_in_palette=True,
+            )
             self._strata = StrataPanel(services)
             self._performance = gui.add_html("")
             controls.dropdown(
@@ -363,7 +370,7 @@ SINGULARITY = Feature(
     manual="singularity.md#Verdict",
     tabs=(Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),),
     bar=(InBar("middle", lambda _: distance_figure),),
-    scene=(scene.EllipsoidScene, scene.BallScene, scene.FreeMotion),
+    scene=(scene.NearestGhost, scene.EllipsoidScene, scene.BallScene, scene.FreeMotion),
     later_feeds=(work.STRATA_FEED,),
     commands=(
         StateCommand(

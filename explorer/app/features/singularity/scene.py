@@ -1,4 +1,4 @@
-"""The ellipsoids, the singularity-free ball, and the free motions."""
+"""The nearest singular pose, the ellipsoids, the singularity-free ball, and the free motions."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ from explorer.app.widgets.buttons import press_button
 from explorer.measures.blocks.block import Number
 from explorer.measures.blocks.singularity import finite_gain
 from explorer.mechanism.folds import FOLD_LINES
+from explorer.mechanism.pose import Pose
 from explorer.mechanism.rgb import Rgb
 from explorer.page.session.clock import Timer, now
 from explorer.page.widgets.assigning import Updates
 from explorer.singularity.colours import FAR, SINGULAR, proximity_colour
 from explorer.singularity.freedoms import FreeTurn
+from explorer.singularity.nearest import NearestSingularity
 
 GHOST_OPACITY, BALL_OPACITY = 0.4, 0.14
 # Semi-axes of an ellipsoid in scene units: for a gain of one, of speeds and of forces; and the
@@ -41,6 +43,64 @@ PERIOD, PERIODS, FRAME_SECONDS = 1.8, 2, 0.04
 AMPLITUDE, LARGEST_ANGLE = 0.05, math.radians(30.0)
 # Length of the axis beyond the points of the mechanism, over the reach.
 OVERHANG = 0.15
+
+
+class PlatformGhost:
+    """The platform in another pose than the present one, and its legs, below a node."""
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._plate = shapes.add_translucent(
+            scene, f"{name}/platform", shapes.NO_MESH, GHOST_OPACITY, colour=SINGULAR
+        )
+        self._legs = shapes.add_lines(scene, f"{name}/legs", 4, shapes.GHOST, 1.5)
+
+    def show(self, visible: bool) -> Updates:
+        """Yield the updates that show or hide the ghost."""
+        yield from show(visible, self._plate, self._legs)
+
+    def draw(self, placed: Placed, pose: Pose) -> Updates:
+        """Yield the updates that draw the ghost in a pose."""
+        yield from shapes.draw_mesh(self._plate, bodies.platform_plate(placed))
+        yield self._plate, "position", tuple((placed.scale * np.array(pose.position)).tolist())
+        yield self._plate, "wxyz", pose.quaternion
+        joints = bodies.platform_joints(placed, np.array([pose.position]), pose.rotation[None])
+        yield self._legs, "points", bodies.leg_lines(placed, joints).astype(np.float32)
+
+
+class NearestGhost(ScenePart):
+    """The platform in the nearest singular pose, its legs, and the displacements of b1 to b4."""
+
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._ghost = PlatformGhost(scene, "/nearest")
+        self._displacements = shapes.add_lines(scene, "/nearest/ways", 4, SINGULAR, 3.0)
+        self._label = shapes.add_label(scene, "/nearest/label", "δ1 = 0")
+
+    def updates(self, placed: Placed) -> Updates:
+        """Yield the updates that draw the singular pose of this frame."""
+        nearest = chosen_ghost(placed)
+        yield from show(nearest is not None, self._ghost, self._displacements, self._label)
+        if nearest is None:
+            return
+        pose = nearest.pose
+        yield from self._ghost.draw(placed, pose)
+        (tips,) = bodies.platform_joints(placed, np.array([pose.position]), pose.rotation[None])
+        here = np.array([placed.points[name] for name in placed.platform_points])
+        yield self._displacements, "points", np.stack([here, tips], axis=1).astype(np.float32)
+        state = placed.frame.state
+        motion = state.unit.text(nearest.distance, size=state.design.reach)
+        words = f"δ{nearest.incidence} = 0: {motion} of motion"
+        yield from shapes.write_label(self._label, words, tips[0])
+
+
+def chosen_ghost(placed: Placed) -> NearestSingularity | None:
+    """Return the singular pose that the view requests; None if it is the present one."""
+    ghost, poses = placed.frame.state.view.singular.ghost, placed.frame.snapshot.nearest
+    if ghost == "none":
+        return None
+    is_any = ghost == "nearest"
+    chosen = min(poses, key=lambda pose: pose.distance) if is_any else poses[int(ghost[1]) - 1]
+    return chosen if chosen.distance > 0.0 else None
 
 
 class EllipsoidScene(ScenePart):
@@ -137,10 +197,7 @@ class FreeMotion(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene, self._session = services.scene, services.session
-        self._plate = shapes.add_translucent(
-            scene, "/freedom/platform", shapes.NO_MESH, GHOST_OPACITY, colour=SINGULAR
-        )
-        self._legs = shapes.add_lines(scene, "/freedom/legs", 4, shapes.GHOST, 1.5)
+        self._ghost = PlatformGhost(scene, "/freedom")
         self._axis = shapes.add_lines(scene, "/freedom/axis", 1, SINGULAR, 3.0)
         self._label = shapes.add_label(scene, "/freedom/label", "")
         self._frame: Frame | None = None
@@ -161,15 +218,10 @@ class FreeMotion(ScenePart):
         self._frame, swing = placed.frame, self._swing
         if swing is not None and (swing.is_over or not swing.is_of(placed.frame.state)):
             swing = self._swing = None
-        yield from show(swing is not None, self._plate, self._legs, self._axis, self._label)
+        yield from show(swing is not None, self._ghost, self._axis, self._label)
         if swing is None:
             return
-        pose = swing.turn.move(swing.frame.state.pose, swing.angle)
-        yield from shapes.draw_mesh(self._plate, bodies.platform_plate(placed))
-        yield self._plate, "position", tuple((placed.scale * np.array(pose.position)).tolist())
-        yield self._plate, "wxyz", pose.quaternion
-        joints = bodies.platform_joints(placed, np.array([pose.position]), pose.rotation[None])
-        yield self._legs, "points", bodies.leg_lines(placed, joints).astype(np.float32)
+        yield from self._ghost.draw(placed, swing.turn.move(swing.frame.state.pose, swing.angle))
         # The line goes beyond all points beside it.
         foot, direction = placed.scale * swing.turn.point, swing.turn.direction
         along = (np.array(list(placed.points.values())) - foot) @ direction
