@@ -14,6 +14,7 @@ the straightness of the guide are left out, too.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -21,11 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.design import JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.machine import DIMENSIONS
-from explorer.motion.inverse_jacobian import A3X, A3Y, B1X, B1Y, B2, B3, twists_of_actuators
+from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, lengths_of
-from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.computed_once import computed_once
 from explorer.numerics.zonotope import signs_of_longest_sums
 
@@ -43,8 +43,10 @@ NO_SOURCES = (
 )
 """Errors of a machine that are no sources, in words."""
 
-# Corners of the cube of the actuators' errors, up to a common sign.
-CORNERS = 32
+# Signs of the actuators' errors at the corners of their cube, up to a common sign, shape (6, 32),
+# and number of poses at whose corners errors are computed at once.
+CORNERS = np.array([(1.0, *corner) for corner in itertools.product((1.0, -1.0), repeat=5)]).T
+BATCH = 1024
 
 
 class ToolError(NamedTuple):
@@ -57,96 +59,6 @@ class ToolError(NamedTuple):
 
     displacement: FloatArray
     turn: FloatArray
-
-
-@helper
-def largest_at_corners(twists: FloatArray, row: int, errors: FloatArray) -> float:
-    """Return the largest |Σ ± e_i v_i| over all signs, with v_i three rows of J⁻¹ from `row`."""
-    x, y, z = 0.0, 0.0, 0.0
-    for i in range(6):
-        x += errors[i] * twists[row, i]
-        y += errors[i] * twists[row + 1, i]
-        z += errors[i] * twists[row + 2, i]
-    largest = x * x + y * y + z * z
-    signs = 0
-    for corner in range(1, CORNERS):
-        # Gray code: one sign changes from a corner to the next.
-        i = 0
-        while corner >> i & 1 == 0:
-            i += 1
-        twice = 2.0 * errors[i] if signs >> i & 1 else -2.0 * errors[i]
-        signs ^= 1 << i
-        x += twice * twists[row, i]
-        y += twice * twists[row + 1, i]
-        z += twice * twists[row + 2, i]
-        largest = max(largest, x * x + y * y + z * z)
-    return math.sqrt(largest)
-
-
-@kernel("void(f8[:,:,::1], f8[:,::1], f8[:,::1])")
-def worst_rows(twists: FloatArray, errors: FloatArray, out: FloatArray) -> None:
-    """Write the largest displacements and turns of n poses, shape (n, 2)."""
-    for k in range(twists.shape[0]):
-        for half in range(2):
-            out[k, half] = math.inf
-            if not math.isinf(twists[k, 0, 0]):
-                out[k, half] = largest_at_corners(twists[k], 3 * half, errors[k % len(errors)])
-
-
-@kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1])")
-def geometry_rows(
-    x: FloatArray,
-    position: FloatArray,
-    rotation: FloatArray,
-    twists: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Write −J⁻¹ ∂q/∂g of n poses, shape (n, 6, 23), infinite in singular ones."""
-    dq = np.zeros((6, 23))
-    for k in range(position.shape[0]):
-        if math.isinf(twists[k, 0, 0]):
-            for row in range(6):
-                for i in range(23):
-                    out[k, row, i] = math.inf
-            continue
-        p, r = position[k], rotation[k]
-        # Legs 1 and 4: from a1 to b1 and from a3 to b4.
-        for leg in range(2):
-            joint = 5 * leg
-            base = A3_COLUMN if leg == 1 else A1_COLUMN
-            end = B_COLUMN + 9 * leg
-            if leg == 0:
-                cx = p[0] + x[B1X] * r[0, 0] + x[B1Y] * r[0, 1]
-                cy = p[1] + x[B1X] * r[1, 0] + x[B1Y] * r[1, 1]
-                cz = p[2] + x[B1X] * r[2, 0] + x[B1Y] * r[2, 1]
-            else:
-                cx, cy, cz = p[0] - x[A3X], p[1] - x[A3Y], p[2]
-            length = math.sqrt(cx * cx + cy * cy + cz * cz)
-            cx, cy, cz = cx / length, cy / length, cz / length
-            dq[joint, base], dq[joint, base + 1], dq[joint, base + 2] = -cx, -cy, -cz
-            for i in range(3):
-                dq[joint, end + i] = cx * r[0, i] + cy * r[1, i] + cz * r[2, i]
-        # Legs 2 and 3: the place along the guide, and the distance from it.
-        for leg in range(2):
-            joint, end = 1 + 2 * leg, B_COLUMN + 3 + 3 * leg
-            b = x[B3] if leg == 1 else x[B2]
-            d, cy, cz = p[0] + b * r[0, 0], p[1] + b * r[1, 0], p[2] + b * r[2, 0]
-            radius = math.sqrt(cy * cy + cz * cz)
-            uy, uz = cy / radius, cz / radius
-            dq[joint, GUIDE_COLUMN] = -1.0
-            dq[joint, TILT_COLUMN], dq[joint, TILT_COLUMN + 1] = -cz, cy
-            dq[joint + 1, GUIDE_COLUMN + 1], dq[joint + 1, GUIDE_COLUMN + 2] = -uy, -uz
-            dq[joint + 1, TILT_COLUMN], dq[joint + 1, TILT_COLUMN + 1] = d * uz, -d * uy
-            for i in range(3):
-                dq[joint, end + i] = r[0, i]
-                dq[joint + 1, end + i] = uy * r[1, i] + uz * r[2, i]
-        for row in range(6):
-            for i in range(23):
-                out[k, row, i] = 0.0
-            for joint in range(6):
-                share = -twists[k, row, joint]
-                for i in range(23):
-                    out[k, row, i] += share * dq[joint, i]
 
 
 def worst_error(
@@ -178,10 +90,15 @@ def worst_errors(configuration: Configuration, errors: ArrayLike) -> ToolError:
     """
     e = finite_array("the errors of the six actuators", errors, (6,), signed=False)
     c = configuration.spread(e)
-    out = np.empty((len(c.positions), 2))
-    worst_rows(len(out), twists_of_actuators(c).reshape(-1, 6, 6), c.rows_or_one(e), out)
-    halves = out.reshape(*c.batch, 2)
-    return ToolError(halves[..., 0], halves[..., 1])
+    twists = twists_of_actuators(c)
+    regular = np.isfinite(twists[..., :1, 0])
+    moved = (np.where(regular[..., None], twists, 0.0) * e[..., None, :]).reshape(-1, 6, 6)
+    squares = np.empty((len(moved), 2))
+    for start in range(0, len(moved), BATCH):
+        x, y, z = np.moveaxis((moved[start : start + BATCH] @ CORNERS).reshape(-1, 2, 3, 32), 2, 0)
+        squares[start : start + BATCH] = (x * x + y * y + z * z).max(axis=-1)
+    largest = np.where(regular, np.sqrt(squares).reshape(*c.batch, 2), np.inf)
+    return ToolError(largest[..., 0], largest[..., 1])
 
 
 @computed_once
@@ -194,11 +111,28 @@ def error_by_geometry(configuration: Configuration) -> FloatArray:
     platform axes. Offsets are in design units, tilts in radians. All entries are infinite in a
     singular pose.
     """
-    c = configuration
-    out = np.empty((len(c.positions), 6, len(DIMENSIONS)))
-    twists = twists_of_actuators(c).reshape(-1, 6, 6)
-    geometry_rows(len(out), c.variables, c.positions, c.rotations, twists, out)
-    return out.reshape(*c.batch, 6, len(DIMENSIONS))
+    c, twists = configuration, twists_of_actuators(configuration)
+    r, u = c.rotation, c.leg_directions
+    # ∂q/∂g, with the joint of a length in each row of legs.
+    slopes, ends = np.zeros((*c.batch, 6, len(DIMENSIONS))), u @ r
+    slopes[..., 0, A1_COLUMN : A1_COLUMN + 3] = -u[..., 0, :]
+    slopes[..., 5, A3_COLUMN : A3_COLUMN + 3] = -u[..., 3, :]
+    for leg, row in enumerate(LENGTH_ROWS):
+        end = B_COLUMN + 3 * leg
+        slopes[..., row, end : end + 3] = ends[..., leg, :]
+        if row not in STRUT_ROWS:
+            continue
+        # The place along the guide, and the distance from it.
+        place, (y, z) = row - 1, (u[..., leg, axis] for axis in (1, 2))
+        slopes[..., place, GUIDE_COLUMN] = -1.0
+        slopes[..., place, TILT_COLUMN] = -z * c.joints[..., row]
+        slopes[..., place, TILT_COLUMN + 1] = y * c.joints[..., row]
+        slopes[..., place, end : end + 3] = r[..., 0, :]
+        slopes[..., row, GUIDE_COLUMN + 1 : GUIDE_COLUMN + 3] = -u[..., leg, 1:]
+        slopes[..., row, TILT_COLUMN] = z * c.joints[..., place]
+        slopes[..., row, TILT_COLUMN + 1] = -y * c.joints[..., place]
+    regular = np.isfinite(twists[..., :1, :1])
+    return np.where(regular, np.where(regular, -twists, 0.0) @ slopes, np.inf)
 
 
 def actuator_errors(design: Design) -> FloatArray:

@@ -19,7 +19,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.margins import planes_of_singularity
 from explorer.motion.inverse_jacobian import B2, B3, holding_forces, is_singular
 from explorer.motion.weights import payload_wrench
-from explorer.numerics.arrays import FloatArray, IntArray, for_kernel
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import norm3
 from explorer.statics.reactions import part_limits
@@ -29,10 +29,9 @@ LOWEST, HIGHEST = -4.0, 2.0
 # Distance from a singular plane of a position on it, over |p|: what is below rounding at this
 # distance does not grow towards the plane. Step of the line beyond, over the way to the plane.
 BESIDE, AHEAD = 1e-9, 1e-3
-# Newton steps onto the limit, halvings where they fail, and the step of differences over |p|.
-STEPS, HALVINGS, DIFFERENCE = 8, 40, 1e-6
-# Largest step in cells, and size of the function on the limit.
-STEP_OF_CELL, ON_LIMIT = 0.5, 1e-9
+# Halvings of an edge onto the limit, and the least part of the edge from its ends, so that no two
+# points coincide.
+HALVINGS, LEAST_PART = 36, 1e-6
 # Number of parts, see `explorer.statics.reactions.part_limits`.
 PARTS = 10
 
@@ -176,104 +175,6 @@ def beyond_plane(on_plane: float, ahead: float) -> float:
     return min(max(on_plane - (ahead - on_plane) / AHEAD, LOWEST), HIGHEST)
 
 
-@helper
-def value_at(
-    case: FloatArray, r: FloatArray, limit: int, p: FloatArray, near: FloatArray, shares: FloatArray
-) -> float:
-    """Return the function of a limit at a position; the last two arguments are working space."""
-    if not move_into_mode(case, p, near):
-        return -1.0
-    write_shares(case, r, near, shares)
-    value = room_of(shares[limit])
-    if move_ahead(p, near):
-        write_shares(case, r, near, shares)
-        value = beyond_plane(value, room_of(shares[limit]))
-    return value
-
-
-@helper
-def rate_along(
-    case: FloatArray,
-    r: FloatArray,
-    limit: int,
-    at: FloatArray,
-    axis: int,
-    h: float,
-    work: FloatArray,
-    shares: FloatArray,
-) -> float:
-    """Return the derivative along an axis by a central difference."""
-    for i in range(3):
-        work[0, i] = at[i]
-    work[0, axis] = at[axis] + h
-    ahead = value_at(case, r, limit, work[0], work[1], shares)
-    work[0, axis] = at[axis] - h
-    return (ahead - value_at(case, r, limit, work[0], work[1], shares)) / (2.0 * h)
-
-
-@helper
-def follow_slope(
-    case: FloatArray,
-    r: FloatArray,
-    limit: int,
-    at: FloatArray,
-    cell: float,
-    work: FloatArray,
-    shares: FloatArray,
-) -> bool:
-    """Move a point onto a limit by Newton's method; return whether it gets there."""
-    h = DIFFERENCE * max(abs(at[0]), abs(at[1]), abs(at[2]), cell)
-    for _ in range(STEPS):
-        value = value_at(case, r, limit, at, work[1], shares)
-        if abs(value) <= ON_LIMIT:
-            return True
-        x = rate_along(case, r, limit, at, 0, h, work, shares)
-        y = rate_along(case, r, limit, at, 1, h, work, shares)
-        z = rate_along(case, r, limit, at, 2, h, work, shares)
-        steepness = norm3((x, y, z))
-        if steepness == 0.0:
-            return False
-        step = min(1.0, STEP_OF_CELL * cell * steepness / abs(value)) * value / steepness**2
-        at[0] -= step * x
-        at[1] -= step * y
-        at[2] -= step * z
-    return False
-
-
-@helper
-def halve(
-    case: FloatArray,
-    r: FloatArray,
-    limit: int,
-    at: FloatArray,
-    point: FloatArray,
-    beside: FloatArray,
-    step: FloatArray,
-    work: FloatArray,
-    shares: FloatArray,
-) -> None:
-    """Move a point onto a limit along the edge from the node beside it, which keeps the limit.
-
-    If the other end keeps it too, the point stays.
-    """
-    low, high = 0.0, math.inf
-    for i in range(3):
-        if point[i] != beside[i]:
-            high = min(high, step[i] / abs(point[i] - beside[i]))
-    for i in range(3):
-        at[i] = beside[i] + high * (point[i] - beside[i])
-    if value_at(case, r, limit, at, work[1], shares) > 0.0:
-        low, high = 1.0, 1.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        for i in range(3):
-            at[i] = beside[i] + middle * (point[i] - beside[i])
-        if value_at(case, r, limit, at, work[1], shares) > 0.0:
-            low = middle
-        else:
-            high = middle
-
-
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], i8[::1])")
 def share_rows(
     case: FloatArray, r: FloatArray, positions: FloatArray, out: FloatArray, parts: IntArray
@@ -308,34 +209,6 @@ def value_rows(
             out[i, k] = room_of(shares[limit])
             if is_beyond:
                 out[i, k] = beyond_plane(room_of(shares[limit]), room_of(ahead[limit]))
-
-
-@kernel("void(f8[::1], f8[:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1])")
-def settle_rows(
-    case: FloatArray,
-    r: FloatArray,
-    limits: IntArray,
-    points: FloatArray,
-    beside: FloatArray,
-    step: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Write points on a limit near n points; one beside which it is not kept stays.
-
-    Where Newton's method fails, the edge from the node beside through the point is halved.
-    """
-    limit, cell = limits[0], min(step[0], step[1], step[2])
-    work, shares = np.empty((2, 3)), np.empty(2 * PARTS)
-    for k in range(points.shape[0]):
-        at = out[k]
-        for i in range(3):
-            at[i] = points[k, i]
-        if value_at(case, r, limit, beside[k], work[1], shares) > 0.0:
-            is_there = follow_slope(case, r, limit, at, cell, work, shares)
-            for i in range(3):
-                is_there = is_there and abs(at[i] - points[k, i]) <= step[i]
-            if not is_there:
-                halve(case, r, limit, at, points[k], beside[k], step, work, shares)
 
 
 def largest_shares(
@@ -374,10 +247,23 @@ def settle_on_limit(
 ) -> FloatArray:
     """Return points on a limit, as of `limit_values`, near points (n, 3), shape (n, 3).
 
-    Each point has the node at the end of its edge that keeps the limit beside it, shape (n, 3), and
-    moves by no more than a cell, whose size on each axis is the step, shape (3,).
+    Each point lies on an edge of a grid whose cells have a size on each axis, the step, shape (3,),
+    and has the node at the end of its edge that keeps the limit beside it, shape (n, 3). It moves
+    along the edge, or stays if the other end keeps the limit too, or none does.
     """
-    out, limits = np.empty(points.shape), np.array([limit], dtype=np.int64)
-    rows = limits, for_kernel(points), for_kernel(beside), for_kernel(step), out
-    settle_rows(len(points), case, for_kernel(rotation), *rows)
-    return out
+    way, limits = points - beside, np.array([limit], dtype=np.int64)
+    parts = np.divide(step, np.abs(way), out=np.full(way.shape, np.inf), where=way != 0.0)
+    edges = parts.min(axis=1)[:, None] * way
+
+    def keeps(share: FloatArray) -> BoolArray:
+        at = beside + share[:, None] * edges
+        return np.asarray(limit_values(case, rotation, limits, at)[0] > 0.0)
+
+    low, high = np.zeros(len(points)), np.ones(len(points))
+    crosses = keeps(low) & ~keeps(high)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        is_kept = keeps(middle)
+        low, high = np.where(is_kept, middle, low), np.where(is_kept, high, middle)
+    share = np.clip(low, LEAST_PART, 1.0 - LEAST_PART)[:, None]
+    return np.where(crosses[:, None], beside + share * edges, points)
