@@ -28,7 +28,7 @@ BLOCK, PARTS = 8192, 4
 # Azimuths of the tilts at which the corners are looked at.
 AZIMUTHS = 8
 # Candidates that miss a demand by more than this are dropped after each look.
-NEARLY = 0.6
+DROPPED = 0.6
 # What counts as a whole miss: in the cosine of a swing, and of margins and the outer size over the
 # longest leg.
 CONE, MARGIN, SIZE = 0.6, 0.1, 0.5
@@ -99,6 +99,6 @@ def _look(
     for look in looks:
         with np.errstate(divide="ignore", invalid="ignore"):
             missed, large = misses(terms, terms.values(x, look))
-        kept = missed < NEARLY
+        kept = missed < DROPPED
         x, missed, large = x[kept], missed[kept], large[kept]
     return x, missed, large

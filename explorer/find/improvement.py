@@ -232,7 +232,7 @@ class Improvement:
             if missed <= FEASIBLE and abs(gain) < SETTLED:
                 break
             is_hopeless = missed > (HOPELESS if turn < LONG else FEASIBLE)
-            if trusted < LEAST_TRUSTED or (turn >= PATIENCE and is_hopeless):
+            if trusted < LEAST_TRUSTED or (turn >= SHORT and is_hopeless):
                 break
         return Improved(x, missed, cost)
 
@@ -315,8 +315,9 @@ FEASIBLE = 1e-6
 TRUSTED, LEAST_TRUSTED, SETTLED = 0.3, 2e-3, 1e-3
 # Weight of what is missed beside the cost, and steps of the solver in a round.
 COST_OF_MISSES, STEPS = 30.0, 12
-# Rounds after which a machine that misses a demand by more than this is given up.
-PATIENCE, HOPELESS, LONG = 3, 0.02, 10
+# Rounds after which a machine that misses a demand by more than this is given up, and those after
+# which it is for any miss.
+SHORT, HOPELESS, LONG = 3, 0.02, 10
 
 
 def _ignore(_: FloatArray, __: FloatArray) -> None:

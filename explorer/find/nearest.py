@@ -12,6 +12,8 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from operator import attrgetter
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -227,32 +229,36 @@ def _leave_out(requirement: Requirement, field: str) -> Requirement:
     """Return a requirement without one demand, or with a small tilt or box."""
     if field in SMALL:
         return relax(requirement, field, 1.0 / SMALL[field]) or requirement
-    head, _, tail = field.partition(".")
-    if tail:
-        changed = {tail: 0.0 if tail == "apart_mm" else None}
-        changed |= {"pull_n": None} if tail == "push_n" else {}
-        return msgspec.structs.replace(
-            requirement, legs=msgspec.structs.replace(requirement.legs, **changed)
-        )
-    return msgspec.structs.replace(requirement, **{head: None})
+    return _with(requirement, field, 0.0 if field == "legs.apart_mm" else None)
 
 
-def _value(requirement: Requirement, field: str) -> float:
-    head, _, tail = field.partition(".")
-    return float(getattr(requirement.legs, tail) if tail else getattr(requirement, head))
+def _value(requirement: Requirement, field: str) -> Any:
+    return attrgetter(field)(requirement)
+
+
+def _with(requirement: Requirement, field: str, value: Any) -> Requirement:
+    """Return a requirement with another value of a field; the limits of pull follow those of push.
+
+    Raises:
+        ExplorerError: The value is not allowed.
+    """
+    _, _, of_legs = field.partition(".")
+    if not of_legs:
+        return msgspec.structs.replace(requirement, **{field: value})
+    changed = {of_legs: value}
+    pull = requirement.legs.pull_n
+    if field == "legs.push_n" and pull is not None:
+        changed["pull_n"] = value and pull * value / _value(requirement, field)
+    legs = msgspec.structs.replace(requirement.legs, **changed)
+    return msgspec.structs.replace(requirement, legs=legs)
 
 
 def relaxable_fields(requirement: Requirement) -> list[str]:
     """Return the demands that may be relaxed, those first that a user gives up most readily."""
-
-    def is_demanded(field: str) -> bool:
-        head, _, tail = field.partition(".")
-        return bool(getattr(requirement.legs, tail) if tail else getattr(requirement, head))
-
     terms = Terms.of(requirement)
     names = {each.name for each in every_demand(terms)}
     fields = (field for field in _WORDS if field not in RELAXED or RELAXED[field] in names)
-    return [field for field in fields if is_demanded(field)]
+    return [field for field in fields if _value(requirement, field)]
 
 
 def relax(requirement: Requirement, field: str, factor: float) -> Requirement | None:
@@ -260,24 +266,18 @@ def relax(requirement: Requirement, field: str, factor: float) -> Requirement | 
 
     Values are those that a user would type, of three digits.
     """
-    head, _, tail = field.partition(".")
-    own = getattr(requirement, head) if not tail else getattr(requirement.legs, tail)
+    own = _value(requirement, field)
     if not math.isfinite(factor):
         return None
-    try:
-        if field == "box_mm":
-            value = tuple(_three_digits(edge / factor, up=False) for edge in own)
-            return msgspec.structs.replace(requirement, box_mm=value)
+    if field == "box_mm":
+        value = tuple(_three_digits(edge / factor, up=False) for edge in own)
+    else:
         shrinks = field in ("tilt_deg", "legs.apart_mm", "transmission")
         value = _three_digits(own / factor if shrinks else own * factor, up=not shrinks)
         if field == "swing_deg" and value > MOST_SWING:
             return None
-        if not tail:
-            return msgspec.structs.replace(requirement, **{field: value})
-        legs = msgspec.structs.replace(requirement.legs, **{tail: value})
-        if tail == "push_n" and legs.pull_n is not None:
-            legs = msgspec.structs.replace(legs, pull_n=legs.pull_n * value / own)
-        return msgspec.structs.replace(requirement, legs=legs)
+    try:
+        return _with(requirement, field, value)
     except ExplorerError:
         return None
 

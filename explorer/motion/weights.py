@@ -29,7 +29,7 @@ AT_REST = (0.0,) * 6
 TOTAL, ROD, ROD_CENTRE, FIRST_MOMENT, SIDE_X, SIDE_Y, SPIN, CROSS = range(8)
 AXIS = slice(8, 11)
 # Which legs start at a carriage.
-ON_GUIDE = np.array([False, True, True, False])
+IS_ON_GUIDE = np.array([False, True, True, False])
 
 
 @dataclass(frozen=True)
@@ -144,31 +144,22 @@ def carry(
     beyond, from_b4 = _swing(turning, turning_rate, first_moment), g - a
     force = mass * from_b4 - beyond
     moment = np.cross(first_moment, from_b4) - rotate(r, torque)
-    arms, turning, turning_rate = (
-        c.design.platform_points @ back,
-        turning[..., None, :],
-        turning_rate[..., None, :],
-    )
+    arms = c.design.platform_points @ back
+    v, a, turning, turning_rate = (each[..., None, :] for each in (v, a, turning, turning_rate))
+    end_v = v + np.cross(turning, arms)
     at_joints, legs, along_guide = _leg_inertia(
-        c,
-        rows,
-        v[..., None, :] + np.cross(turning, arms),
-        a[..., None, :] + _swing(turning, turning_rate, arms),
-        g,
+        c, rows, end_v, a + _swing(turning, turning_rate, arms), g
     )
     force = force + at_joints.sum(axis=-2)
     moment = moment + np.cross(arms, at_joints).sum(axis=-2) - np.cross(c.arm, force)
     wrench = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
     # Masses times units/s² so far.
+    parts = wrench, at_joints, along_guide[..., IS_ON_GUIDE], legs
+    shapes = (6,), (4, 3), (2,), (4, 3)
     return Carried(
         *(
-            np.broadcast_to(metres * each, (*c.batch, *own))
-            for each, own in (
-                (wrench, (6,)),
-                (at_joints, (4, 3)),
-                (along_guide[..., ON_GUIDE], (2,)),
-                (legs, (4, 3)),
-            )
+            np.broadcast_to(metres * each, (*c.batch, *shape))
+            for each, shape in zip(parts, shapes, strict=True)
         )
     )
 
@@ -187,9 +178,10 @@ def _leg_inertia(
         The forces at their ends that stand for them, their sums, (..., 4, 3), and the moments by
         which they change those of the forces of their carriages, (..., 4), in N and N × unit.
     """
-    total, rod, rod_centre, first_moment, side_x, side_y, spin, cross = rows.T[: AXIS.start]
-    slide, s = np.where(ON_GUIDE, a[..., 0], 0.0), c.leg_directions
-    v, a = (np.where(ON_GUIDE[:, None], each * ACROSS, each) for each in (v, a))
+    total, rod, rod_centre, first_moment, side_x, side_y, spin, cross = rows[:, : AXIS.start].T
+    slide, s = np.where(IS_ON_GUIDE, a[..., 0], 0.0), c.leg_directions
+    from_rail = slide - float(g[0])
+    v, a = (np.where(IS_ON_GUIDE[:, None], each * ACROSS, each) for each in (v, a))
     has_length = c.leg_lengths > 0.0
     length = np.where(has_length, c.leg_lengths, 1.0)
     # The leg's frame (x, y, s): y is the second axis of the universal joint, and the first axis is
@@ -226,7 +218,7 @@ def _leg_inertia(
     # the end, which moves by v_x = l w_y and v_y = −l w_x, is the opposite.
     about_first = tx + cotangent * tz + cross * first_acceleration / sine
     along_leg = rod * (length_acceleration - back * square - dot(s, g))
-    across = np.where(ON_GUIDE, total * (slide - g[0]), ty / length)
+    across = np.asarray(np.where(IS_ON_GUIDE, total * from_rail, ty / length), np.float64)
     frame = np.stack([x, y, s], axis=-2)
 
     def combine(*shares: FloatArray) -> FloatArray:
@@ -239,6 +231,6 @@ def _leg_inertia(
     sums = total[:, None] * g - rod[:, None] * a - swinging * (a - turn)
     sums[..., 0] -= total * slide
     # Along the guide the centre is at first_moment / total from the carriage, the force at l.
-    on_carriage = (g[0] - slide) * (total * length - at_base)
+    on_carriage = -from_rail * (total * length - at_base)
     at_end, sums = (np.where(has_length[..., None], each, 0.0) for each in (at_end, sums))
     return at_end, sums, np.where(has_length, on_carriage, 0.0)
