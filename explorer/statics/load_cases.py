@@ -4,8 +4,8 @@ A part has two limits: its value must not exceed the largest and not fall below 
 load is held where the share s of every limit is at most 1. Each limit has a function of position
 that is zero there, 1 where the share is far below zero and −1 where it is infinite:
 (1 − s) / √(1 + s²). It is smooth, also towards a singular plane of the home mode, whether the share
-grows there or not. Beyond the plane it goes on along the line through its values on the plane and a
-little before it. The plane itself is a limit of the workspace.
+grows there or not. Beyond the plane it is that of the nearest position on it; the plane itself is a
+limit of the workspace.
 """
 
 from __future__ import annotations
@@ -24,11 +24,9 @@ from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import norm3
 from explorer.statics.reactions import part_limits
 
-# Least and largest value of the functions.
-LOWEST, HIGHEST = -4.0, 2.0
 # Distance from a singular plane of a position on it, over |p|: what is below rounding at this
-# distance does not grow towards the plane. Step of the line beyond, over the way to the plane.
-BESIDE, AHEAD = 1e-9, 1e-3
+# distance does not grow towards the plane.
+BESIDE = 1e-9
 # Halvings of an edge onto the limit, and the least part of the edge from its ends, so that no two
 # points coincide.
 HALVINGS, LEAST_PART = 36, 1e-6
@@ -160,21 +158,6 @@ def move_into_mode(case: FloatArray, p: FloatArray, near: FloatArray) -> bool:
     return False
 
 
-@helper
-def move_ahead(p: FloatArray, near: FloatArray) -> bool:
-    """Move on from the nearest position of the mode; return whether that is another one."""
-    is_beyond = near[0] != p[0] or near[1] != p[1] or near[2] != p[2]
-    for i in range(3):
-        near[i] += AHEAD * (near[i] - p[i])
-    return is_beyond
-
-
-@helper
-def beyond_plane(on_plane: float, ahead: float) -> float:
-    """Return the function beyond a singular plane, by its values on it and ahead of it."""
-    return min(max(on_plane - (ahead - on_plane) / AHEAD, LOWEST), HIGHEST)
-
-
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], i8[::1])")
 def share_rows(
     case: FloatArray, r: FloatArray, positions: FloatArray, out: FloatArray, parts: IntArray
@@ -194,21 +177,14 @@ def value_rows(
     case: FloatArray, r: FloatArray, limits: IntArray, positions: FloatArray, out: FloatArray
 ) -> None:
     """Write the functions of m limits at n positions, shape (m, n)."""
-    near, shares, ahead = np.empty(3), np.empty(2 * PARTS), np.empty(2 * PARTS)
+    near, shares = np.empty(3), np.empty(2 * PARTS)
     for k in range(positions.shape[0]):
-        if not move_into_mode(case, positions[k], near):
-            for i in range(limits.shape[0]):
-                out[i, k] = -1.0
-            continue
-        write_shares(case, r, near, shares)
-        is_beyond = move_ahead(positions[k], near)
-        if is_beyond:
-            write_shares(case, r, near, ahead)
+        if move_into_mode(case, positions[k], near):
+            write_shares(case, r, near, shares)
+        else:
+            shares[:] = math.inf
         for i in range(limits.shape[0]):
-            limit = int(limits[i])
-            out[i, k] = room_of(shares[limit])
-            if is_beyond:
-                out[i, k] = beyond_plane(room_of(shares[limit]), room_of(ahead[limit]))
+            out[i, k] = room_of(shares[int(limits[i])])
 
 
 def largest_shares(
