@@ -1,17 +1,18 @@
-"""Meshes for printers, CAD and viewers: 3MF, STL, GLB and PLY, with names and colours.
+"""Meshes for printers, CAD and viewers: 3MF, STL, GLB, OBJ and PLY, with names and colours.
 
 Coordinates are those of the base frame in millimetres; GLB is by its specification in metres with
-y up. 3MF, STL and GLB hold single precision (6e-8 of the largest coordinate), PLY double.
+y up. 3MF, STL and GLB hold single precision (6e-8 of the largest coordinate), PLY and OBJ double.
 
-trimesh packs GLB and STL, lib3mf 3MF. PLY is written here: that of trimesh has single precision and
-no limits in comments.
+trimesh packs GLB and STL, lib3mf 3MF. PLY and OBJ are written here: those of trimesh have no limits
+(comments, groups), and its PLY has single precision.
 """
 
 from __future__ import annotations
 
 import math
+import re
 import unicodedata
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -239,7 +240,7 @@ def _single(solid: Solid, file_format: str, decimals: int | None = None) -> Soli
         return rounded
     raise InputError(
         f"{file_format} holds single precision, which spoils a mesh of this size at coordinates up "
-        f"to {float(np.abs(points).max()):.3g}; ply holds double"
+        f"to {float(np.abs(points).max()):.3g}; ply and obj hold double"
     )
 
 
@@ -262,7 +263,7 @@ def _ply(solid: Solid, *_: object) -> bytes:
         f"comment {APPLICATION}",
         "comment unit millimetre",
         *(
-            f"comment colour {' '.join(map(str, colour_of(limit)))} {ascii_name(limit)}"
+            f"comment colour {_join_numbers(colour_of(limit))} {ascii_name(limit)}"
             for limit in solid.limits
         ),
         f"element vertex {len(solid.vertices)}",
@@ -278,6 +279,21 @@ def _ply(solid: Solid, *_: object) -> bytes:
     faces["colour"] = np.array([colour_of(limit) for limit in solid.limits])[solid.limit_of_face]
     head = ("\n".join(lines) + "\n").encode("ascii")
     return head + solid.vertices.astype("<f8").tobytes() + faces.tobytes()
+
+
+def _obj(solid: Solid, _: Design, name: str) -> bytes:
+    lines = [
+        f"# {APPLICATION}",
+        "# unit millimetre",
+        f"o {_word(name)}",
+        *(f"v {_join_numbers(point)}" for point in solid.vertices.tolist()),
+    ]
+    for index, limit in enumerate(solid.limits):
+        faces = solid.faces[solid.limit_of_face == index] + 1
+        if len(faces):
+            lines.append(f"g {_word(limit)}")
+            lines.extend(f"f {_join_numbers(face)}" for face in faces.tolist())
+    return ("\n".join(lines) + "\n").encode("ascii")
 
 
 def _glb(solid: Solid, design: Design, name: str) -> bytes:
@@ -301,7 +317,17 @@ def _3mf(solid: Solid, design: Design, name: str) -> bytes:
     return model.encode(mesh, decimals)
 
 
+def _word(name: str) -> str:
+    """Return a name of OBJ: without blanks, and without what ends or continues a line."""
+    return re.sub(r"[ #\\]", "_", ascii_name(name))
+
+
+def _join_numbers(values: Iterable[float]) -> str:
+    """Return numbers with all their digits, separated by spaces."""
+    return " ".join(map(repr, values))
+
+
 FORMATS: Mapping[str, Callable[[Solid, Design, str], bytes]] = MappingProxyType(
-    {"3mf": _3mf, "stl": _stl, "glb": _glb, "ply": _ply}
+    {"3mf": _3mf, "stl": _stl, "glb": _glb, "obj": _obj, "ply": _ply}
 )
 """The writer of each format by its name, which is also its suffix."""

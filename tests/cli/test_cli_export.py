@@ -287,7 +287,7 @@ FOLDS = ["--folds", "14", "45", "98", "-140", "-120", "60"]
 @pytest.mark.parametrize(
     ("what", "name", "options", "words"),
     [
-        ("workspace", "file.dwg", [], "no mesh format 'dwg'; there are 3mf, stl, glb, ply"),
+        ("workspace", "file.dwg", [], "no mesh format 'dwg'; there are 3mf, stl, glb, obj, ply"),
         ("workspace", "file.step", ["--tolerance", "1"], "--tolerance is not for workspace"),
         ("workspace", "file", [], "give --format"),
         ("workspace", "missing/file.stl", [], "no folder"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 import zipfile
 from dataclasses import replace
@@ -114,9 +115,10 @@ def test_glb_is_in_metres_with_y_up() -> None:
 
 
 def text_lines(data: bytes) -> list[str]:
-    """Return the lines of the header of a PLY file, as strict readers want them.
+    """Return the lines of an OBJ file or of the header of a PLY file, as strict readers want them.
 
-    They take ASCII in lines of at most 200 characters, and trim blanks.
+    They take ASCII in lines of at most 200 characters, and trim blanks; a backslash at the end of
+    a line of OBJ appends the next one.
     """
     head = data.partition(b"end_header\n")[0]
     assert head.endswith(b"\n")
@@ -133,12 +135,15 @@ NAMES = [
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_ply_of_any_name_has_short_lines_in_ascii(name: str) -> None:
-    data = mesh_bytes(SOLID, "ply", OPTIMAL, name)
-    shape = read(data, "ply")
-    assert len(shape.vertices) == len(SOLID.vertices)
-    assert len(shape.faces) == len(SOLID.faces)
-    assert text_lines(data)
+def test_ply_and_obj_of_any_name_have_short_lines_in_ascii(name: str) -> None:
+    for file_format in ("ply", "obj"):
+        data = mesh_bytes(SOLID, file_format, OPTIMAL, name)
+        shape = read(data, file_format)
+        assert len(shape.vertices) == len(SOLID.vertices)
+        assert len(shape.faces) == len(SOLID.faces)
+        own = [line for line in text_lines(data) if line.startswith("o ")]
+        assert len(own) == (file_format == "obj")
+        assert all(re.fullmatch(r"o [!-~]+", line) and "?" not in line for line in own)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -163,6 +168,16 @@ def test_ply_reads_back_corners_and_face_colours() -> None:
     np.testing.assert_array_equal(colours, expected)
 
 
+def test_obj_reads_back_corners_and_groups_of_limits() -> None:
+    lines = mesh_bytes(SOLID, "obj", OPTIMAL, NAME).decode("ascii").splitlines()
+    corners = [[float(x) for x in line.split()[1:]] for line in lines if line.startswith("v ")]
+    np.testing.assert_array_equal(corners, SOLID.vertices * OPTIMAL.unit_mm)
+    groups = [line[2:] for line in lines if line.startswith("g ")]
+    used = {limit.replace(" ", "_") for limit in limits_of_faces(SOLID)}
+    assert set(groups) == used
+    assert len(groups) == len(used)
+
+
 @pytest.mark.parametrize("file_format", FORMATS)
 def test_mesh_bytes_empty_or_open_solid_is_refused_with_reason(file_format: str) -> None:
     empty = workspace_solid(OPTIMAL, np.eye(3))
@@ -175,7 +190,7 @@ def test_mesh_bytes_empty_or_open_solid_is_refused_with_reason(file_format: str)
 @pytest.mark.parametrize("file_format", ["stl", "glb", "3mf"])
 def test_mesh_bytes_far_solid_is_refused_in_single_precision(file_format: str) -> None:
     far = replace(SOLID, vertices=SOLID.vertices + [1e7, 0.0, 0.0])
-    with pytest.raises(InputError, match="ply holds double"):
+    with pytest.raises(InputError, match="ply and obj hold double"):
         mesh_bytes(far, file_format, OPTIMAL, NAME)
     shape = read(mesh_bytes(far, "ply", OPTIMAL, NAME), "ply")
     assert shape.is_watertight

@@ -72,10 +72,10 @@ class ExportCommand(options.JsonOptions, options.TypicalOptions, options.PoseOpt
         str | None,
         values.hint(
             "default: the suffix of the file",
-            "3mf|stl|glb|ply|step|stl-zip|mjcf|html|svg|c|ini",
+            "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html|svg|c|ini",
         ),
     ] = None
-    """Format; 3mf has unit, names, colours, ply doubles, step (extra `cad`) exact faces."""
+    """Format; 3mf has unit, names, colours, ply and obj doubles, step (extra `cad`) exact faces."""
 
     tolerance: Annotated[
         values.Positive, values.hint("workspace and hull; default: a 500th of the reach")
@@ -198,7 +198,7 @@ def _step(command: ExportCommand) -> tuple[bytes, Facts]:
     if command.load is not None:
         raise InputError(
             "STEP takes exact faces, and the surface along which a part takes its limit consists "
-            "of facets: write 3mf, stl, glb or ply"
+            "of facets: write 3mf, stl, glb, obj or ply"
         )
     command.refuse_all_but(*_ORIENTATION)
     check_extra("cad")

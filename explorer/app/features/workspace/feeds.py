@@ -146,7 +146,7 @@ WORKSPACE_FEED = FeedOf(work.draw_workspace, workspace_request, has_stages=True)
 
 
 # The hull consists of facets, which STEP does not take.
-HULL_FORMATS = ("3mf", "stl", "glb", "ply")
+HULL_FORMATS = ("3mf", "stl", "glb", "obj", "ply")
 FORMATS = (*HULL_FORMATS, work.STEP)
 """The formats of files; `work.STEP` takes the workspace within the limits only."""
 

@@ -330,7 +330,7 @@ def export_mesh(
             cause = "legs begin to collide" if region == "accessible" else "a part takes its limit"
             raise InputError(
                 f"STEP takes exact faces, and the surface along which {cause} consists of facets; "
-                "export it as 3mf, stl, glb or ply, or choose the region "
+                "export it as 3mf, stl, glb, obj or ply, or choose the region "
                 '"within the limits"'
             )
         from explorer.export.step import exact_workspace, step_bytes
