@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import SINGULAR, margins_at, margins_of
-from explorer.numerics.arrays import FloatArray, batch_shape, finite_array
+from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.numerics.checks import FARTHEST
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.computed_once import computed_once
@@ -109,6 +109,31 @@ def holding_forces(
     )
 
 
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1])")
+def force_rows(
+    x: FloatArray,
+    tools: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    loads: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write the actuator forces that hold loads at tools (n or 1, 3), infinite if singular."""
+    for k in range(position.shape[0]):
+        p, r = position[k], rotation[k]
+        if is_singular(x, p, r):
+            for i in range(6):
+                out[k, i] = math.inf
+            continue
+        t, w = tools[k % tools.shape[0]], loads[k % loads.shape[0]]
+        arm = times(r, t)
+        force = (w[0], w[1], w[2])
+        moment = along((w[3], w[4], w[5]), 1.0, cross3(arm, force))
+        forces = holding_forces(x, p, r, force, moment)
+        for i in range(6):
+            out[k, i] = forces[i]
+
+
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1])")
 def inverse_rows(
     x: FloatArray,
@@ -171,8 +196,8 @@ def forces_of(configuration: Configuration, load: ArrayLike) -> FloatArray:
     Raises:
         InputError: The load is unusable, or batch axes do not broadcast.
     """
-    w, twists = load_array(load), twists_of_actuators(configuration)
-    batch_shape((w, 1), (twists, 2))
-    regular = np.isfinite(twists[..., :1, 0])
-    forces = np.einsum("...ji,...j->...i", np.where(regular[..., None], twists, 0.0), -w)
-    return np.where(regular, forces, np.inf)
+    w = load_array(load)
+    c = configuration.spread(w)
+    out = np.empty((len(c.positions), 6))
+    force_rows(len(out), c.variables, c.tools, c.positions, c.rotations, c.rows_or_one(w), out)
+    return out.reshape(*c.batch, 6)

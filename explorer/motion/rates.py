@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTH_ROWS, Design
 from explorer.mechanism.points import ACROSS
-from explorer.motion.weights import IS_ON_GUIDE, motion_array
+from explorer.motion.weights import motion_array
 from explorer.numerics.arrays import FloatArray, dot, rotate
+
+IS_ON_GUIDE = np.array([False, True, True, False])
 
 
 def joint_rates(

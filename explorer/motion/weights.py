@@ -18,8 +18,10 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
-from explorer.mechanism.points import ACROSS
-from explorer.numerics.arrays import FloatArray, dot, finite_array, lengths_of, rotate
+from explorer.motion.inverse_jacobian import A3X, A3Y
+from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, along, column, cross3, dot3, norm3, times, vector
 
 LARGEST_RATE = 1e20
 """Largest entry of a twist or an acceleration, far below what makes forces overflow."""
@@ -27,9 +29,9 @@ AT_REST = (0.0,) * 6
 
 # Columns of the rows of the legs, see `MovingBodies`.
 TOTAL, ROD, ROD_CENTRE, FIRST_MOMENT, SIDE_X, SIDE_Y, SPIN, CROSS = range(8)
-AXIS = slice(8, 11)
-# Which legs start at a carriage.
-IS_ON_GUIDE = np.array([False, True, True, False])
+AXIS_X, AXIS_Y, AXIS_Z = range(8, 11)
+# First columns of the rows of `inertia_rows` after the wrench, and their number.
+AT_JOINTS, ALONG_GUIDE, OF_LEGS, COLUMNS = 6, 18, 20, 32
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,142 @@ def motion_array(name: str, value: ArrayLike) -> FloatArray:
     return finite_array(f"the {name} (X Y Z, then turning)", value, (6,), LARGEST_RATE)
 
 
+@helper
+def combine(shares: Vector, x: Vector, y: Vector, z: Vector) -> Vector:
+    """Return the sum of three vectors with shares."""
+    return along(along(along((0.0, 0.0, 0.0), shares[0], x), shares[1], y), shares[2], z)
+
+
+@helper
+def acceleration_of(a: Vector, turning: Vector, turning_rate: Vector, arm: Vector) -> Vector:
+    """Return the acceleration of a point of a body at an arm from one with the acceleration a."""
+    swing = cross3(turning, arm)
+    return along(along(a, 1.0, cross3(turning_rate, arm)), 1.0, cross3(turning, swing))
+
+
+@helper
+def leg_inertia(
+    leg: Vector, v: Vector, a: Vector, g: Vector, on_guide: bool, row: FloatArray
+) -> tuple[Vector, Vector, float]:
+    """Return the load of a leg's weight and inertia, given its vector and the motion of its end.
+
+    Returns:
+        The force at its end that stands for them, their sum, and the moment by which they change
+        that of the force of its carriage, in N and N × unit.
+    """
+    slide, first = 0.0, (row[AXIS_X], row[AXIS_Y], row[AXIS_Z])
+    if on_guide:
+        slide = a[0]
+        leg, v, a = (0.0, leg[1], leg[2]), (0.0, v[1], v[2]), (0.0, a[1], a[2])
+    length = norm3(leg)
+    if length == 0.0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+    rod, total = row[ROD], row[TOTAL]
+    s = along((0.0, 0.0, 0.0), 1.0 / length, leg)
+    # The leg's frame (x, y, s): y is the second axis of the universal joint, and the first axis is
+    # sine x + cosine s. Along the first axis y is undefined, and the spin is taken as zero.
+    y, cosine = cross3(s, first), dot3(s, first)
+    sine = norm3(y)
+    if sine > 0.0:
+        y = along((0.0, 0.0, 0.0), 1.0 / sine, y)
+    else:
+        y, cosine, sine = (0.0, 0.0, 1.0), 0.0, 1.0
+    x, cotangent = cross3(y, s), cosine / sine
+    # Angular velocity w in this frame, from v = l̇ s + w × l s. The leg turns by φ̇ about the first
+    # axis and by w_y about y, so that w_x = φ̇ sine and w_z = φ̇ cosine.
+    length_rate = dot3(s, v)
+    wx, wy = -dot3(y, v) / length, dot3(x, v) / length
+    wz = cotangent * wx
+    # Angular acceleration in this frame. With sine' = −w_y cosine and cosine' = w_y sine, φ̈ is
+    # (alpha_x + w_y w_z) / sine.
+    square = wx * wx + wy * wy
+    length_acceleration = dot3(s, a) + length * square
+    alpha_x = -(dot3(y, a) + 2.0 * length_rate * wx) / length + wy * wz
+    alpha_y = (dot3(x, a) - 2.0 * length_rate * wy) / length - wx * wz
+    first_acceleration = (alpha_x + wy * wz) / sine
+    alpha_z = cosine * first_acceleration + wx * wy
+    # Euler's equations of cylinder and rod about the base joint.
+    back = length - row[ROD_CENTRE]
+    first_moment = row[FIRST_MOMENT] + rod * back
+    ix = row[SIDE_X] + rod * back * back
+    iy, iz = row[SIDE_Y] + rod * back * back, row[SPIN]
+    # The rod goes farther out, so that the inertia about the base joint grows at this rate.
+    growth = 2.0 * rod * back * length_rate
+    tx = ix * alpha_x + growth * wx + (iz - iy) * wy * wz + first_moment * dot3(y, g)
+    ty = iy * alpha_y + growth * wy + (ix - iz) * wx * wz - first_moment * dot3(x, g)
+    tz = iz * alpha_z + (iy - ix) * wx * wy
+    # Their power is w_x (t_x + cotangent t_z + cross φ̈ / sine) + w_y t_y, and that of a force at
+    # the end, which moves by v_x = l w_y and v_y = −l w_x, is the opposite.
+    about_first = tx + cotangent * tz + row[CROSS] * first_acceleration / sine
+    along_leg = rod * (length_acceleration - back * square - dot3(s, g))
+    across = total * (slide - g[0]) if on_guide else ty / length
+    at_end = combine((-across, about_first / length, -along_leg), x, y, s)
+    # The sum of mass × acceleration is rod a + swinging · l s̈, with l s̈ = a − l̈ s − 2 l̇ ṡ.
+    swinging = (row[FIRST_MOMENT] - rod * row[ROD_CENTRE]) / length
+    turn = (2.0 * length_rate * wy, -2.0 * length_rate * wx, length_acceleration)
+    total_force = combine((total, -rod, -swinging), g, a, along(a, -1.0, combine(turn, x, y, s)))
+    total_force = (total_force[0] - total * slide, total_force[1], total_force[2])
+    # Along the guide the centre is at first_moment / total from the carriage, the force at l.
+    return at_end, total_force, (g[0] - slide) * (total * length - first_moment)
+
+
+@kernel(
+    "void(f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], "
+    "f8[:,::1], f8[:,::1])"
+)
+def inertia_rows(
+    variables: FloatArray,
+    points: FloatArray,
+    gravity: FloatArray,
+    platform: FloatArray,
+    legs: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    twists: FloatArray,
+    accelerations: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write the load of weights and inertia in n motions, shape (n, 32).
+
+    A row has the four arrays of `Carried` in turn, the wrench about b4.
+    """
+    g = (gravity[0], gravity[1], gravity[2])
+    mass = platform[3, 3]
+    for k in range(position.shape[0]):
+        r, p = rotation[k], vector(position, k)
+        t, rate = twists[k % twists.shape[0]], accelerations[k % accelerations.shape[0]]
+        v, turning = (t[0], t[1], t[2]), (t[3], t[4], t[5])
+        a, turning_rate = (rate[0], rate[1], rate[2]), (rate[3], rate[4], rate[5])
+        x, y, z = column(r, 0), column(r, 1), column(r, 2)
+        # The platform turns in its own frame, in which its inertia does not change.
+        own = (dot3(x, turning), dot3(y, turning), dot3(z, turning))
+        own_rate = (dot3(x, turning_rate), dot3(y, turning_rate), dot3(z, turning_rate))
+        i, j, h = column(platform, 0), column(platform, 1), column(platform, 2)
+        torque = along(combine(own_rate, i, j, h), 1.0, cross3(own, combine(own, i, j, h)))
+        # Mass × centre from b4, and mass × the acceleration of the centre beyond that of b4.
+        first_moment = combine(column(platform, 3), x, y, z)
+        beyond = acceleration_of((0.0, 0.0, 0.0), turning, turning_rate, first_moment)
+        from_b4 = along(g, -1.0, a)
+        force = along((-beyond[0], -beyond[1], -beyond[2]), mass, from_b4)
+        moment = along(cross3(first_moment, from_b4), -1.0, combine(torque, x, y, z))
+        for leg in range(4):
+            arm, on_guide = times(r, points[leg]), 0 < leg < 3
+            end = along(p, 1.0, arm)
+            if leg == 3:
+                end = (end[0] - variables[A3X], end[1] - variables[A3Y], end[2])
+            end_v = along(v, 1.0, cross3(turning, arm))
+            end_a = acceleration_of(a, turning, turning_rate, arm)
+            at_end, total, on_carriage = leg_inertia(end, end_v, end_a, g, on_guide, legs[leg])
+            force, moment = along(force, 1.0, at_end), along(moment, 1.0, cross3(arm, at_end))
+            if on_guide:
+                out[k, ALONG_GUIDE + leg - 1] = on_carriage
+            for axis in range(3):
+                out[k, AT_JOINTS + 3 * leg + axis] = at_end[axis]
+                out[k, OF_LEGS + 3 * leg + axis] = total[axis]
+        for axis in range(3):
+            out[k, axis], out[k, 3 + axis] = force[axis], moment[axis]
+
+
 def carry(
     configuration: Configuration,
     bodies: MovingBodies,
@@ -132,105 +270,23 @@ def carry(
     """
     t, rate = motion_array("twist", twist), motion_array("acceleration", acceleration)
     c, metres = configuration.spread(t, rate), 1e-3 * configuration.design.unit_mm
-    g, r = STANDARD_GRAVITY / metres * np.array(c.design.gravity), c.rotation
-    (v, turning), (a, turning_rate) = (np.split(each, 2, axis=-1) for each in (t, rate))
-    platform, rows = bodies.arrays
-    # The platform turns in its own frame, in which its inertia does not change.
-    inertia, mass, back = platform[:3, :3], platform[3, 3], np.swapaxes(r, -1, -2)
-    own, own_rate = rotate(back, turning), rotate(back, turning_rate)
-    torque = own_rate @ inertia + np.cross(own, own @ inertia)
-    # Mass × centre from b4, and mass × the acceleration of the centre beyond that of b4.
-    first_moment = rotate(r, platform[:3, 3])
-    beyond, from_b4 = _swing(turning, turning_rate, first_moment), g - a
-    force = mass * from_b4 - beyond
-    moment = np.cross(first_moment, from_b4) - rotate(r, torque)
-    arms = c.design.platform_points @ back
-    v, a, turning, turning_rate = (each[..., None, :] for each in (v, a, turning, turning_rate))
-    end_v = v + np.cross(turning, arms)
-    at_joints, legs, along_guide = _leg_inertia(
-        c, rows, end_v, a + _swing(turning, turning_rate, arms), g
+    out = np.empty((len(c.positions), COLUMNS))
+    inertia_rows(
+        len(out),
+        c.variables,
+        c.design.platform_points,
+        STANDARD_GRAVITY / metres * np.array(c.design.gravity),
+        *bodies.arrays,
+        c.positions,
+        c.rotations,
+        c.rows_or_one(t),
+        c.rows_or_one(rate),
+        out,
     )
-    force = force + at_joints.sum(axis=-2)
-    moment = moment + np.cross(arms, at_joints).sum(axis=-2) - np.cross(c.arm, force)
-    wrench = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
     # Masses times units/s² so far.
-    parts = wrench, at_joints, along_guide[..., IS_ON_GUIDE], legs
-    shapes = (6,), (4, 3), (2,), (4, 3)
-    return Carried(
-        *(
-            np.broadcast_to(metres * each, (*c.batch, *shape))
-            for each, shape in zip(parts, shapes, strict=True)
-        )
-    )
-
-
-def _swing(turning: FloatArray, turning_rate: FloatArray, arm: FloatArray) -> FloatArray:
-    """Return the acceleration of a point of a body at an arm beyond that of the arm's start."""
-    return np.cross(turning_rate, arm) + np.cross(turning, np.cross(turning, arm))
-
-
-def _leg_inertia(
-    c: Configuration, rows: FloatArray, v: FloatArray, a: FloatArray, g: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the load of the legs' weight and inertia, given the motion of their ends, (..., 4, 3).
-
-    Returns:
-        The forces at their ends that stand for them, their sums, (..., 4, 3), and the moments by
-        which they change those of the forces of their carriages, (..., 4), in N and N × unit.
-    """
-    total, rod, rod_centre, first_moment, side_x, side_y, spin, cross = rows[:, : AXIS.start].T
-    slide, s = np.where(IS_ON_GUIDE, a[..., 0], 0.0), c.leg_directions
-    from_rail = slide - float(g[0])
-    v, a = (np.where(IS_ON_GUIDE[:, None], each * ACROSS, each) for each in (v, a))
-    has_length = c.leg_lengths > 0.0
-    length = np.where(has_length, c.leg_lengths, 1.0)
-    # The leg's frame (x, y, s): y is the second axis of the universal joint, and the first axis is
-    # sine x + cosine s. Along the first axis y is undefined, and the spin is taken as zero.
-    y, cosine = np.cross(s, rows[:, AXIS]), dot(s, rows[:, AXIS])
-    sine = lengths_of(y)
-    is_turned = sine > 0.0
-    sine, cosine = np.where(is_turned, sine, 1.0), np.where(is_turned, cosine, 0.0)
-    y = np.where(is_turned[..., None], y / sine[..., None], [0.0, 0.0, 1.0])
-    x, cotangent = np.cross(y, s), cosine / sine
-    # Angular velocity w in this frame, from v = l̇ s + w × l s. The leg turns by φ̇ about the first
-    # axis and by w_y about y, so that w_x = φ̇ sine and w_z = φ̇ cosine.
-    length_rate = dot(s, v)
-    wx, wy = -dot(y, v) / length, dot(x, v) / length
-    wz = cotangent * wx
-    # Angular acceleration in this frame. With sine' = −w_y cosine and cosine' = w_y sine, φ̈ is
-    # (alpha_x + w_y w_z) / sine.
-    square = wx * wx + wy * wy
-    length_acceleration = dot(s, a) + length * square
-    alpha_x = -(dot(y, a) + 2.0 * length_rate * wx) / length + wy * wz
-    alpha_y = (dot(x, a) - 2.0 * length_rate * wy) / length - wx * wz
-    first_acceleration = (alpha_x + wy * wz) / sine
-    alpha_z = cosine * first_acceleration + wx * wy
-    # Euler's equations of cylinder and rod about the base joint.
-    back = length - rod_centre
-    at_base = first_moment + rod * back
-    ix, iy, iz = side_x + rod * back * back, side_y + rod * back * back, spin
-    # The rod goes farther out, so that the inertia about the base joint grows at this rate.
-    growth = 2.0 * rod * back * length_rate
-    tx = ix * alpha_x + growth * wx + (iz - iy) * wy * wz + at_base * dot(y, g)
-    ty = iy * alpha_y + growth * wy + (ix - iz) * wx * wz - at_base * dot(x, g)
-    tz = iz * alpha_z + (iy - ix) * wx * wy
-    # Their power is w_x (t_x + cotangent t_z + cross φ̈ / sine) + w_y t_y, and that of a force at
-    # the end, which moves by v_x = l w_y and v_y = −l w_x, is the opposite.
-    about_first = tx + cotangent * tz + cross * first_acceleration / sine
-    along_leg = rod * (length_acceleration - back * square - dot(s, g))
-    across = np.asarray(np.where(IS_ON_GUIDE, total * from_rail, ty / length), np.float64)
-    frame = np.stack([x, y, s], axis=-2)
-
-    def combine(*shares: FloatArray) -> FloatArray:
-        return np.asarray(np.einsum("...k,...ki->...i", np.stack(shares, axis=-1), frame))
-
-    at_end = combine(-across, about_first / length, -along_leg)
-    # The sum of mass × acceleration is rod a + swinging · l s̈, with l s̈ = a − l̈ s − 2 l̇ ṡ.
-    swinging = ((first_moment - rod * rod_centre) / length)[..., None]
-    turn = combine(2.0 * length_rate * wy, -2.0 * length_rate * wx, length_acceleration)
-    sums = total[:, None] * g - rod[:, None] * a - swinging * (a - turn)
-    sums[..., 0] -= total * slide
-    # Along the guide the centre is at first_moment / total from the carriage, the force at l.
-    on_carriage = -from_rail * (total * length - at_base)
-    at_end, sums = (np.where(has_length[..., None], each, 0.0) for each in (at_end, sums))
-    return at_end, sums, np.where(has_length, on_carriage, 0.0)
+    parts = np.split(metres * out.reshape(*c.batch, COLUMNS), (AT_JOINTS, ALONG_GUIDE, OF_LEGS), -1)
+    wrench, at_joints, along_guide, legs = parts
+    if c.tool.any():
+        wrench[..., 3:] -= np.cross(c.arm, wrench[..., :3])
+    at_joints, legs = (each.reshape(*c.batch, 4, 3) for each in (at_joints, legs))
+    return Carried(wrench, at_joints, along_guide, legs)

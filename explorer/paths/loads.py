@@ -180,7 +180,7 @@ class DemandedLoad:
             change = rotate(asked, forces) + angle * (speeds[:, :, 6:] @ sizes)
             change += angle * lengths_of(twists[:, :, 0, 3:]) * lengths_of(self.load[3:])
             # The weights of the legs act at their joints, partly across the legs, with the first
-            # moment over the length that `explorer.motion.weights.carry` swings.
+            # moment over the length that `explorer.motion.weights.leg_inertia` swings.
             leaning = np.abs(legs[:, FIRST_MOMENT] - legs[:, ROD] * legs[:, ROD_CENTRE])
             leaning = gravity * leaning / lengths[:, LENGTH_ROWS]
             standing = gravity * legs[:, TOTAL]

@@ -9,26 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
-from explorer.legs.clearance import write_closest
+from explorer.legs.clearance import pair_rows
 from explorer.legs.interference import tetrahedra_overlap
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
-from explorer.numerics.compiled import kernel
 
 TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("a3", "b4"))
 """The six legs of the 6-4 twin, base point and platform point (the paper's Figure 1a)."""
-
-
-@kernel("void(f8[:,:,:,::1], i8[:,::1], f8[:,:,::1], f8[:,::1])")
-def distance_rows(axes: FloatArray, pairs: IntArray, points: FloatArray, out: FloatArray) -> None:
-    """Write the distances of pairs of segments, shape (n, m), of axes (n, legs, 2, 3).
-
-    `points` is a place to work in, shape (1, 2, 3).
-    """
-    for k in range(axes.shape[0]):
-        for i in range(pairs.shape[0]):
-            out[k, i] = write_closest(axes[k, pairs[i, 0]], axes[k, pairs[i, 1]], points[0])
 
 
 @dataclass(frozen=True)
@@ -76,10 +64,14 @@ class SixLegs:
 
     def clearances(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Return the distances of the axes of the pairs, shape (n, m)."""
-        axes = for_kernel(self.axes(position, rotation))
-        out = np.empty((len(axes), len(self.pairs)))
-        distance_rows(len(axes), axes, self.pairs, np.empty((1, 2, 3)), out)
-        return out
+        axes = self.axes(position, rotation)
+        distance, points = np.empty((len(axes), 6)), np.empty((len(axes), 6, 2, 3))
+        found: list[FloatArray] = []
+        for i, j in self.pairs.tolist():
+            # The first pair of these legs.
+            pair_rows(len(axes), for_kernel(axes[:, [i, j, i, j]]), distance, points)
+            found.append(distance[:, 0].copy())
+        return np.stack(found, axis=-1)
 
     def step_overlaps(self, start: FloatArray, end: FloatArray, rotation: FloatArray) -> BoolArray:
         """Return whether legs collide on steps by the paper's test, shape (n,)."""

@@ -9,6 +9,7 @@ length.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,9 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.machine import or_infinite
-from explorer.motion.inverse_jacobian import load_array, twists_of_actuators
+from explorer.motion.inverse_jacobian import B2, B3, load_array, twists_of_actuators
 from explorer.numerics.arrays import FloatArray, finite_array, lengths_of, positive_array
+from explorer.numerics.compiled import helper, kernel
 
 RIGID = "joints, carriages, guide, platform and base"
 """The definition of rigid, in words."""
@@ -55,6 +57,45 @@ class ComplianceShares(NamedTuple):
     actuators: FloatArray
 
 
+@helper
+def strut_length(x: FloatArray, which: int, p: FloatArray, r: FloatArray) -> float:
+    """Return d2 or d4, given the column of b2 or b3 in the design variables."""
+    y, z = p[1] + x[which] * r[1, 0], p[2] + x[which] * r[2, 0]
+    return math.sqrt(y * y + z * z)
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1])")
+def compliance_rows(
+    x: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    twists: FloatArray,
+    softness: FloatArray,
+    bending: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write the compliance of n poses, infinite in singular ones.
+
+    Twists are J⁻¹; softness is 1 / k, shape (n or 1, 6), and bending 1 / 3EI of both struts, shape
+    (n or 1, 2).
+    """
+    c = np.zeros(6)
+    for k in range(position.shape[0]):
+        for i in range(6):
+            c[i] = softness[k % softness.shape[0], i]
+        b = bending[k % bending.shape[0]]
+        c[1] += b[0] * strut_length(x, B2, position[k], rotation[k]) ** 3
+        c[3] += b[1] * strut_length(x, B3, position[k], rotation[k]) ** 3
+        singular = math.isinf(twists[k, 0, 0])
+        for i in range(6):
+            for j in range(i + 1):
+                total = 0.0
+                for q in range(6):
+                    total += twists[k, i, q] * c[q] * twists[k, j, q] if not singular else math.inf
+                out[k, i, j] = total
+                out[k, j, i] = total
+
+
 def compliance(
     design: Design,
     position: ArrayLike,
@@ -82,14 +123,18 @@ def compliance_of(
     """
     soft, bending = _softness(stiffness, bending_stiffness)
     c = configuration.spread(soft, bending)
-    softness = np.zeros((*c.batch, 6)) + soft
-    softness[..., GUIDE_ROWS] += bending * c.joints[..., STRUT_ROWS] ** 3
-    twists = twists_of_actuators(c)
-    regular = np.isfinite(twists[..., :1, :1])
-    finite = np.where(regular, twists, 0.0)
-    found = (finite * softness[..., None, :]) @ np.swapaxes(finite, -1, -2)
-    # Rounding leaves it symmetric.
-    return np.where(regular, 0.5 * (found + np.swapaxes(found, -1, -2)), np.inf)
+    out = np.empty((len(c.positions), 6, 6))
+    compliance_rows(
+        len(out),
+        c.variables,
+        c.positions,
+        c.rotations,
+        twists_of_actuators(c).reshape(-1, 6, 6),
+        c.rows_or_one(soft),
+        c.rows_or_one(bending),
+        out,
+    )
+    return out.reshape(*c.batch, 6, 6)
 
 
 def stiffness_of(design: Design) -> tuple[FloatArray, FloatArray]:

@@ -10,10 +10,10 @@ from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import Design, margins, rotation_from_quaternion
+from explorer.motion.rates import IS_ON_GUIDE
 from explorer.motion.weights import (
-    AXIS,
+    AXIS_X,
     FIRST_MOMENT,
-    IS_ON_GUIDE,
     ROD,
     ROD_CENTRE,
     TOTAL,
@@ -43,7 +43,7 @@ class LegMasses:
         rows[:, TOTAL] = carriages + self.cylinders + np.array(self.rods)
         rows[:, ROD], rows[:, ROD_CENTRE] = self.rods, self.rod_centres
         rows[:, FIRST_MOMENT] = np.multiply(self.cylinders, self.cylinder_centres)
-        rows[:, AXIS] = 1.0, 0.0, 0.0
+        rows[:, AXIS_X] = 1.0
         return MovingBodies(legs=rows)
 
 
