@@ -35,9 +35,10 @@ from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,
+    TiltByTorsion,
     TiltMap,
     greatest_tilt,
-    tilt_at_best_torsion,
+    tilt_by_torsion,
     tilt_map,
 )
 
@@ -66,8 +67,8 @@ def tilts() -> Generator[work.TiltsDrawing]:
 
 
 @pytest.fixture(scope="module")
-def best() -> GreatestTilt:
-    return tilt_at_best_torsion(OPTIMAL, (10.0, 5.0, 9.0))
+def by_torsion() -> TiltByTorsion:
+    return tilt_by_torsion(OPTIMAL, (10.0, 5.0, 9.0))
 
 
 def services_and_worker() -> tuple[Services, StubJobs]:
@@ -169,7 +170,7 @@ def test_position_feed_computes_share_and_torsions() -> None:
     drawing = services.get(work.POSITION_FEED).drawing
     assert drawing is not None
     assert drawing.share == orientation_share(OPTIMAL, state.pose.position)
-    assert drawing.best == tilt_at_best_torsion(OPTIMAL, state.pose.position)
+    assert drawing.by_torsion.best == tilt_by_torsion(OPTIMAL, state.pose.position).best
 
 
 def test_tilts_over_positions_are_the_greatest_of_each(tilts: work.TiltsDrawing) -> None:
@@ -179,10 +180,11 @@ def test_tilts_over_positions_are_the_greatest_of_each(tilts: work.TiltsDrawing)
         assert tilts.tilts[index] == pytest.approx(expected, abs=1e-6)
 
 
-def test_best_torsion_is_told_beside_the_present_one(best: GreatestTilt) -> None:
+def test_best_torsion_is_told_beside_the_present_one(by_torsion: TiltByTorsion) -> None:
+    best = by_torsion.best
     assert best_words(best, best.tilt).endswith(", as here")
     assert "at" in best_words(best, best.tilt - 1.0).split()
-    assert best_words(tilt_at_best_torsion(OPTIMAL, (30.0, 5.0, 9.0)), np.nan) == "none"
+    assert best_words(tilt_by_torsion(OPTIMAL, (30.0, 5.0, 9.0)).best, np.nan) == "none"
 
 
 def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> None:

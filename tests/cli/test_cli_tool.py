@@ -24,7 +24,7 @@ from explorer.mechanism.configuration import position_of
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.singularity.ellipsoids import performance
 from explorer.workspace.orientations.share import orientation_share
-from explorer.workspace.orientations.tilts import tilt_at_best_torsion, tilt_map
+from explorer.workspace.orientations.tilts import tilt_by_torsion, tilt_map, torsion_range
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 TOOL = (1.0, -0.5, 3.0)
@@ -155,6 +155,7 @@ def test_capability_and_orientations_are_those_of_the_tool(cli: CommandLine) -> 
     home = TOOLED.home_pose
     default = cli.answer("orientation", "--samples", "10", *AT_TOOL)
     assert_allclose(default["tool_position"], position_of(TOOLED, home, "tool"))
+    assert default["home_connected"]
 
 
 @pytest.mark.parametrize("what", ["workspace", "hull"])
@@ -208,7 +209,7 @@ POSITION = (10.0, 5.0, 9.0)
 AT = ("orientation", "--position", "10", "5", "9")
 
 
-def test_orientation_json_has_share_and_tilts(cli: CommandLine) -> None:
+def test_orientation_json_has_share_tilts_and_torsions(cli: CommandLine) -> None:
     found = cli.answer(*AT, "--torsion", "-60", "--samples", "5000")
     share = orientation_share(PRESET, POSITION, 5000)
     assert (found["share"], found["standard_error"]) == (share.share, share.standard_error)
@@ -219,9 +220,17 @@ def test_orientation_json_has_share_and_tilts(cli: CommandLine) -> None:
     tilts = tilt_map(PRESET, POSITION, -60.0)
     assert found["tilts"] == tilts.tilts.tolist()
     assert found["limits"] == list(tilts.limits)
-    best = tilt_at_best_torsion(PRESET, POSITION)
-    assert found["best_tilt"] == best.tilt >= found["greatest_tilt"]
-    assert found["best_torsion"] == best.torsion
+    torsions = torsion_range(PRESET, POSITION, -60.0)
+    assert found["torsion_range"] == [torsions.low, torsions.high]
+    assert found["torsion_limits"] == [torsions.low_limit, torsions.high_limit]
+    by_torsion = tilt_by_torsion(PRESET, POSITION)
+    assert found["torsions"] == by_torsion.torsions.tolist()
+    assert found["tilts_by_torsion"] == [
+        None if np.isnan(tilt) else tilt for tilt in by_torsion.tilts.tolist()
+    ]
+    assert found["best_tilt"] == by_torsion.best.tilt >= found["greatest_tilt"]
+    assert found["best_torsion"] == by_torsion.best.torsion
+    assert found["home_connected"] is True
 
 
 def test_orientation_text_has_a_line_for_each_azimuth(cli: CommandLine) -> None:
@@ -237,6 +246,8 @@ def test_orientation_where_tilt_zero_violates_a_limit_says_so(cli: CommandLine) 
     found = cli.answer(*outside)
     assert found["share"] == 0.0
     assert found["greatest_tilt"] is None
+    assert found["torsion_range"] == [None, None]
+    assert found["home_connected"] is False
     assert "none: tilt zero violates" in cli.text(*outside)
 
 

@@ -15,7 +15,7 @@ from explorer.singularity.nearest import nearest_singular_poses
 from explorer.statics.forces import actuator_forces
 from explorer.statics.load_cases import largest_shares, limit_values, load_case, settle_on_limit
 from explorer.workspace.orientations.share import orientation_share
-from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map
+from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map, torsion_range
 from explorer.workspace.slices.column_volume import volume_of_columns
 from explorer.workspace.workspace import Workspace
 
@@ -33,7 +33,9 @@ def joints() -> FloatArray:
 
 
 def tilts() -> FloatArray:
-    return tilt_map(OPTIMAL, POSITION, azimuths=9).tilts
+    found = tilt_map(OPTIMAL, POSITION, azimuths=9)
+    torsions = torsion_range(OPTIMAL, POSITION, azimuth=20.0, tilt=10.0)
+    return np.array([*found.tilts, torsions.low, torsions.high])
 
 
 def regions() -> FloatArray:

@@ -21,8 +21,10 @@ from explorer.workspace.orientations.share import orientations_within
 from explorer.workspace.orientations.tilts import (
     greatest_tilt,
     greatest_tilts,
-    tilt_at_best_torsion,
+    is_connected,
+    tilt_by_torsion,
     tilt_map,
+    torsion_range,
 )
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
@@ -121,17 +123,21 @@ def test_greatest_tilt_is_the_least_of_a_fine_map(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_tilt_at_best_torsion_is_the_largest_of_all(seed: int) -> None:
+def test_tilt_by_torsion_is_that_of_each_torsion_and_its_best_the_largest(seed: int) -> None:
     design, position, _ = case_of(seed)
-    found = tilt_at_best_torsion(design, position)
-    fine = greatest_tilts(design, position, np.linspace(-180.0, 180.0, 721))
-    if math.isnan(found.tilt):
-        assert np.isnan(fine).all()
-        assert found.limit is not None
+    found = tilt_by_torsion(design, position, 24)
+    np.testing.assert_allclose(np.diff(found.torsions), 15.0)
+    each = [greatest_tilt(design, position, sigma).tilt for sigma in found.torsions]
+    np.testing.assert_allclose(found.tilts, each, atol=1e-3)
+    if np.isnan(found.tilts).all():
+        assert math.isnan(found.best.tilt)
+        assert found.best.limit is not None
         return
-    assert found.tilt >= np.nanmax(fine) - 1e-3
-    there = greatest_tilt(design, position, found.torsion)
-    assert there.tilt == pytest.approx(found.tilt, abs=1e-9)
+    assert found.best.tilt >= np.nanmax(found.tilts)
+    there = greatest_tilt(design, position, found.best.torsion)
+    assert there.tilt == pytest.approx(found.best.tilt, abs=1e-9)
+    fine = found.best.torsion + np.linspace(-14.0, 14.0, 141)
+    assert found.best.tilt >= np.nanmax(greatest_tilts(design, position, fine)) - 1e-3
 
 
 def test_greatest_tilts_take_torsions_beside_positions() -> None:
@@ -148,15 +154,62 @@ def test_greatest_tilts_take_torsions_beside_positions() -> None:
         greatest_tilts(design, positions[:, 0], torsions)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_torsion_range_agrees_with_dense_turns(seed: int) -> None:
+    design, position, torsion, tool = tool_case_of(seed, (0.0, 0.2, 0.2)[seed % 3])
+    for azimuth, tilt in ((0.0, 0.0), (40.0, 15.0)):
+        found = torsion_range(design, position, torsion, azimuth, tilt, tool)
+        turns = np.arange(0.0, 360.0, STEP)
+        angles = [
+            np.array([[azimuth, tilt, s - azimuth] for s in torsion + k * turns]) for k in (-1, 1)
+        ]
+        down, up = (
+            orientations_within(
+                design, position, Rotation.from_euler("ZYZ", each, degrees=True).as_matrix(), tool
+            )
+            for each in angles
+        )
+        if not down[0]:
+            assert math.isnan(found.low)
+            assert found.low_limit == found.high_limit is not None
+        elif up.all():
+            assert (found.low, found.high) == (torsion - 180.0, torsion + 180.0)
+            assert found.low_limit is found.high_limit is None
+        else:
+            for within, end in ((down, torsion - found.low), (up, found.high - torsion)):
+                last = float(turns[within.argmin() - 1])
+                assert last - 1e-6 <= end <= last + STEP + 1e-6
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_orientation_is_connected_to_tilt_zero_up_to_the_tilt_of_the_map(seed: int) -> None:
+    design, position, torsion, tool = tool_case_of(seed, (0.0, 0.2, 0.2)[seed % 3])
+    found = tilt_map(design, position, torsion, 8, tool)
+    for azimuth, tilt in zip(found.azimuths.tolist(), found.tilts.tolist(), strict=True):
+        if math.isnan(tilt):
+            start = tilted(azimuth, np.zeros(1), torsion)[0]
+            assert not is_connected(design, position, start, tool=tool)
+            continue
+        inside, outside = tilted(azimuth, np.array([0.99 * tilt, tilt + 0.01]), torsion)
+        assert is_connected(design, position, inside, tool=tool)
+        if tilt < 179.9:
+            assert not is_connected(design, position, outside, tool=tool)
+
+
 @pytest.mark.parametrize(
     ("words", "measure", "arguments"),
     [
         *(("number of azimuths", tilt_map, {"azimuths": n}) for n in (0, 10**9)),
         *(("azimuths must be a whole", tilt_map, {"azimuths": n}) for n in (3.5, "many", True)),
         ("number of azimuths", greatest_tilts, {"azimuths": 2}),
+        *(("number of torsions", tilt_by_torsion, {"torsions": n}) for n in (2, 3.5)),
         ("azimuths must be", tilt_map, {"azimuths": [[1.0]]}),
         ("torsion", tilt_map, {"torsion": math.nan}),
         ("one torsion", tilt_map, {"torsion": [1.0, 2.0]}),
+        ("one azimuth", torsion_range, {"azimuth": [1.0, 2.0]}),
+        ("one tilt", torsion_range, {"tilt": [1.0, 2.0]}),
+        ("tilt must be finite", torsion_range, {"tilt": math.nan}),
+        ("rotation", is_connected, {"rotation": np.zeros((3, 3))}),
         ("one tool point", greatest_tilt, {"tool": [(0.0, 0.0, 1.0)]}),
         ("tool must be finite", tilt_map, {"tool": (0.0, 0.0, math.nan)}),
         ("one position", tilt_map, {"position": [(1.0, 2.0, 3.0)]}),

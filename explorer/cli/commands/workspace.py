@@ -288,9 +288,13 @@ def _mesh_remark(solid: Solid) -> str:
     return f"{len(solid.faces)} triangles, {state}, tolerance {solid.tolerance:.3g}{off}"
 
 
+CONNECTED = "connected to tilt zero by a tilt without a gap"
+NOT_CONNECTED = "not connected to tilt zero by a tilt within the limits"
+
+
 @dataclass(frozen=True, kw_only=True)
 class OrientationCommand(options.JsonOptions, options.PointOptions):
-    """Measure the orientations of a position: share of all, and greatest tilts.
+    """Measure the orientations of a position: share of all, greatest tilts, torsion.
 
     The platform tilts from tilt zero, at one torsion and in each azimuth, until it meets the first
     limit. Collisions of legs are not among the limits. With `--at tool` the tool stays in its
@@ -314,13 +318,18 @@ class OrientationCommand(options.JsonOptions, options.PointOptions):
         share = shares.orientation_share(design, position, self.samples, tool=tool)
         least = tilts.greatest_tilt(design, position, self.torsion, tool)
         by_azimuth = tilts.tilt_map(design, position, self.torsion, tool=tool)
-        best = tilts.tilt_at_best_torsion(design, position, tool)
+        by_torsion = tilts.tilt_by_torsion(design, position, tool=tool)
+        best = by_torsion.best
+        torsions = tilts.torsion_range(design, position, self.torsion, tool=tool)
+        is_home_connected = tilts.is_connected(design, position, home.rotation, tool=tool)
         name = "position" if self.at == "b4" else "tool position"
         rows = [
             ("share of all orientations", _share_words(share)),
             ("torsion", *output.degrees([least.torsion])),
             ("greatest tilt in every azimuth", _least_words(least)),
             ("largest at any torsion", _best_words(best)),
+            ("torsion range at tilt zero", _range_words(torsions)),
+            ("home orientation", CONNECTED if is_home_connected else NOT_CONNECTED),
         ]
         self.write(
             lambda: {
@@ -333,8 +342,13 @@ class OrientationCommand(options.JsonOptions, options.PointOptions):
                 "azimuths": by_azimuth.azimuths,
                 "tilts": [*map(output.finite, by_azimuth.tilts.tolist())],
                 "limits": by_azimuth.limits,
+                "torsions": by_torsion.torsions,
+                "tilts_by_torsion": [*map(output.finite, by_torsion.tilts.tolist())],
                 "best_torsion": best.torsion,
                 "best_tilt": output.finite(best.tilt),
+                "torsion_range": [output.finite(torsions.low), output.finite(torsions.high)],
+                "torsion_limits": [torsions.low_limit, torsions.high_limit],
+                "home_connected": is_home_connected,
             },
             [
                 output.heading(design),
@@ -375,3 +389,12 @@ def _best_words(best: tilts.GreatestTilt) -> str:
         return "none: tilt zero violates a limit at every torsion"
     tilt, torsion = output.degrees([best.tilt, best.torsion])
     return f"{tilt} at torsion {torsion}"
+
+
+def _range_words(torsions: tilts.TorsionRange) -> str:
+    if math.isnan(torsions.low):
+        return f"none: tilt zero violates {torsions.low_limit}"
+    if torsions.low_limit is None:
+        return "all"
+    low, high = output.degrees([torsions.low, torsions.high])
+    return f"{low} ({torsions.low_limit}) to {high} ({torsions.high_limit})"

@@ -1,4 +1,4 @@
-"""Tilts that a position can have: how far the platform tilts until a limit stops it.
+"""Tilts and torsions that a position can have: how far the platform turns until a limit stops it.
 
 The angles are those of `explorer.mechanism.tilt_torsion`. At a torsion the platform tilts from
 tilt zero in each azimuth, b4 or the tool held in its place, until it meets the first limit. That
@@ -17,14 +17,15 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import Design
-from explorer.mechanism.tilt_torsion import tilt_torsion_of
+from explorer.mechanism.pose import rotation_array
+from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
 from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.table import by_quantity, demands_of
 from explorer.workspace.limits.valid_poses import Rules
 from explorer.workspace.orientations.least_tilts import least_tilt_rows, tilt_rows
 from explorer.workspace.orientations.share import MOST_ANGLES, even_angles, one_angle, one_position
-from explorer.workspace.orientations.turns import NO_LIMIT
+from explorer.workspace.orientations.turns import NO_LIMIT, turn_rows
 
 AZIMUTHS = 72
 """Number of azimuths of a map of tilts, and of those between which the least tilt of each of many
@@ -194,31 +195,141 @@ def names_of(design: Design, limits: list[int]) -> tuple[str | None, ...]:
     return tuple(None if limit == NO_LIMIT else names[limit] for limit in limits)
 
 
-# Number of torsions among which the best one is searched, and the width in degrees of the interval
-# of torsions at which the search ends.
 TORSIONS = 72
+"""Number of torsions at which the greatest tilt is measured."""
+
+# Width in degrees of the interval of torsions at which the search for the best one ends.
 TORSION_WIDTH = 1e-3
 
 
-def tilt_at_best_torsion(
-    design: Design, position: ArrayLike, tool: ArrayLike | None = None
-) -> GreatestTilt:
-    """Return the greatest tilt in every azimuth of a position at the torsion that allows the most.
+@dataclass(frozen=True)
+class TorsionRange:
+    """The torsions that lead on from one without a gap, at a tilt; angles in degrees.
 
-    It is searched between the neighbours of the best one of 72 torsions once around; the tilt is
-    NaN if none of them is possible. Other arguments and errors are those of `greatest_tilt`.
+    Attributes:
+        low: Least torsion, at most 360° below the one that the range starts from; NaN if that one
+            violates a limit.
+        high: Largest torsion, at most 360° above the one that the range starts from, and above
+            the least one; NaN as `low`. If every torsion is possible, both are 180° away.
+        low_limit: Name of the limit at the least torsion, or that the start violates; None if
+            every torsion is possible.
+        high_limit: Name of the limit at the largest torsion, as `low_limit`.
+    """
+
+    low: float
+    high: float
+    low_limit: str | None
+    high_limit: str | None
+
+
+@dataclass(frozen=True)
+class TiltByTorsion:
+    """The greatest tilt in every azimuth of a position at each of n torsions; angles in degrees.
+
+    Attributes:
+        torsions: Torsions at equal distances once around from −180 on, shape (n,).
+        tilts: Greatest tilts in every azimuth, shape (n,); NaN where tilt zero violates a limit.
+        best: The largest of all; its tilt is NaN if no torsion is possible.
+    """
+
+    torsions: FloatArray
+    tilts: FloatArray
+    best: GreatestTilt
+
+
+def torsion_range(
+    design: Design,
+    position: ArrayLike,
+    torsion: float | None = None,
+    azimuth: float = 0.0,
+    tilt: float = 0.0,
+    tool: ArrayLike | None = None,
+) -> TorsionRange:
+    """Return the torsions that a position can have without a gap from one torsion, at a tilt.
+
+    The azimuth and the tilt, in degrees, stay the same. The range starts from the torsion. Other
+    arguments and errors are those of `greatest_tilt`.
+    """
+    p, sigma = one_position(position), _torsion_of(design, torsion)
+    r = rotation_from_tilt_torsion([one_angle("azimuth", azimuth), one_angle("tilt", tilt), sigma])
+    angles, limits = _end_of_turns(design, p, _turns_about_z(r), tool)
+    down, up = in_degrees(angles).tolist()
+    names = names_of(design, limits)
+    if names[0] is None and names[1] is None:
+        return TorsionRange(sigma - 180.0, sigma + 180.0, None, None)
+    if names[0] is None or names[1] is None:
+        # Half a turn one way ends where the other way ends, beyond that half turn.
+        half = r * np.array([-1.0, -1.0, 1.0])
+        angles, limits = _end_of_turns(design, p, _turns_about_z(half), tool)
+        # Where the half turn ends on a limit, rounding may make the start of the rest invalid.
+        more, rest_names = np.maximum(np.degrees(angles), 0.0).tolist(), names_of(design, limits)
+        if names[0] is None:
+            down = min(180.0 + more[0], 360.0 - up)
+            names = rest_names[0] or names[1], names[1]
+        else:
+            up = min(180.0 + more[1], 360.0 - down)
+            names = names[0], rest_names[1] or names[0]
+    return TorsionRange(sigma - down, sigma + up, *names)
+
+
+def tilt_by_torsion(
+    design: Design, position: ArrayLike, torsions: int = TORSIONS, tool: ArrayLike | None = None
+) -> TiltByTorsion:
+    """Return the greatest tilt in every azimuth of a position at a number of torsions once around.
+
+    The best of them is searched between the neighbours of the best one of the row. There are three
+    torsions or more. Other arguments and errors are those of `greatest_tilt`.
     """
     p = one_position(position)
-    angles = even_angles("torsions", TORSIONS) - 180.0
+    angles = even_angles("torsions", torsions) - 180.0
     tilts = greatest_tilts(design, p, angles, AZIMUTHS_OF_ONE, tool)
-    middle = float(angles[np.nan_to_num(tilts, nan=-1.0).argmax()])
+    if np.isnan(tilts).all():
+        return TiltByTorsion(angles, tilts, greatest_tilt(design, p, float(angles[0]), tool))
+    step, middle = 360.0 / len(angles), float(angles[np.nanargmax(tilts)])
     best = greatest_tilt(design, p, middle, tool)
-    low, high = middle - 360.0 / TORSIONS, middle + 360.0 / TORSIONS
-    while high - low > TORSION_WIDTH and not math.isnan(best.tilt):
+    low, high = middle - step, middle + step
+    while high - low > TORSION_WIDTH:
         tried = np.linspace(low, high, 9)
         found = np.nan_to_num(greatest_tilts(design, p, tried, AZIMUTHS_OF_ONE, tool), nan=-1.0)
         top = int(found.argmax())
         if found[top] > best.tilt:
             best = greatest_tilt(design, p, float(tried[top]), tool)
         low, high = float(tried[max(top - 1, 0)]), float(tried[min(top + 1, 8)])
-    return best
+    return TiltByTorsion(angles, tilts, best)
+
+
+def _end_of_turns(
+    design: Design, position: FloatArray, turns: FloatArray, tool: ArrayLike | None
+) -> tuple[FloatArray, list[int]]:
+    """Return the angles (n,) in radians at which turns (n, 3, 3, 3) end, and their limits."""
+    count = len(turns)
+    angles, limits = np.empty(count), np.empty(count, dtype=np.int64)
+    rules, p = Rules.of(design).without_clearances(), arrays.for_kernel(position)
+    turn_rows(count, *rules, p, one_tool(tool), turns, angles, limits)
+    return angles, limits.tolist()
+
+
+def _turns_about_z(rotation: FloatArray) -> FloatArray:
+    """Return the turns down and up from a rotation about the platform's z-axis, (2, 3, 3, 3)."""
+    # For a decreasing torsion the platform's x-axis turns towards its negative y-axis.
+    sine = 2.0 * np.column_stack([rotation[:, 1], -rotation[:, 0], np.zeros(3)])
+    end = rotation * np.array([-1.0, -1.0, 1.0])
+    return np.stack([np.stack([rotation, side * sine, end], axis=-1) for side in (-1.0, 1.0)])
+
+
+# Error of an angle that is computed in two ways, in degrees.
+ANGLE_TOLERANCE = 1e-7
+
+
+def is_connected(
+    design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
+) -> bool:
+    """Return whether an orientation is connected to tilt zero by a tilt without a gap.
+
+    The tilt keeps azimuth and torsion. At tilt 180°, where many torsions give one orientation, it
+    is that of torsion 0. Position, tool and errors are those of `greatest_tilt`; the orientation is
+    a rotation (3, 3).
+    """
+    azimuth, tilt, torsion = tilt_torsion_of(rotation_array(rotation))
+    reached = tilt_map(design, one_position(position), torsion, [azimuth], tool).tilts[0]
+    return bool(reached >= tilt - ANGLE_TOLERANCE)

@@ -15,7 +15,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from explorer.numerics.arrays import FloatArray
+import numpy as np
+
+from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.bernstein import (
     MOST_DEGREE,
     NOWHERE,
@@ -25,7 +27,7 @@ from explorer.numerics.bernstein import (
     keep_left,
     keep_right,
 )
-from explorer.numerics.compiled import helper
+from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector
 from explorer.workspace.limits.quantities import (
     A3,
@@ -374,3 +376,20 @@ def first_limit(search: TurnSearch) -> tuple[float, int]:
             if found < 0.0:
                 return START_IS_INVALID, limit
     return (math.pi if limit == NO_LIMIT else angle_at(end)), limit
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,:,::1], f8[::1], i8[::1])")
+def turn_rows(
+    row: FloatArray,
+    demands: FloatArray,
+    p: FloatArray,
+    tool: FloatArray,
+    turns: FloatArray,
+    angles: FloatArray,
+    limits: IntArray,
+) -> None:
+    """Write the angles and first limits of n turns, shape (n, 3, 3, 3), as `first_limit` does."""
+    scratch = np.zeros(SCRATCH)
+    for index in range(turns.shape[0]):
+        search = TurnSearch(row, demands, p, tool, turns[index], scratch)
+        angles[index], limits[index] = first_limit(search)

@@ -34,6 +34,7 @@ from explorer.workspace.orientations.tilts import (
     GreatestTilt,
     greatest_tilt,
     tilt_map,
+    torsion_range,
 )
 
 # Size of a point over the distance of nodes.
@@ -111,7 +112,7 @@ def _tilt(text: str) -> Action | None:
 def summary(
     frame: Frame, here: TiltTorsion, least: GreatestTilt, feed: work.PositionFeed
 ) -> Iterator[str]:
-    """Yield the greatest tilts, and the share of orientations."""
+    """Yield the greatest tilt, the share of orientations and the range of torsions."""
     state = frame.state
     if math.isnan(least.tilt):
         yield alert("Tilt zero is beyond a limit here", f"It violates {least.limit}.")
@@ -130,19 +131,27 @@ def summary(
         share = f"{100.0 * found.share:.2f} % ± {100.0 * found.standard_error:.2f} %"
         if found.share in (0.0, 1.0):
             share = f"{'all' if found.share else 'none'} of {found.orientations:,}"
-        best = best_words(feed.drawing.best, least.tilt)
+        best = best_words(feed.drawing.by_torsion.best, least.tilt)
     if feed.problem is not None:
         share = best = "unknown"
         yield problem(feed, "The share and the largest tilt could not be computed", "")
+    torsions = torsion_range(
+        state.design, state.position, here.torsion, here.azimuth, here.tilt, tool=state.tool
+    )
+    span = f"{_degrees(torsions.low)} to {_degrees(torsions.high)}"
+    if math.isnan(torsions.low) or torsions.low_limit is None:
+        span = "none here" if math.isnan(torsions.low) else "all"
     look = look_of(feed)
     largest = "The greatest tilt in every azimuth at the torsion that allows the most"
     possible = "Share of all orientations that this position can have within the limits, with its "
+    turns = "Torsions that a turn about the platform's z-axis leads to, at the present azimuth "
     yield table(
         (
             row(dim("Largest at any torsion"), best, look=look, hint=largest),
             row(
                 dim("Share of all orientations"), share, look=look, hint=f"{possible}standard error"
             ),
+            row(dim("Torsions without a gap"), span, hint=f"{turns}and tilt"),
         )
     )
 

@@ -32,9 +32,9 @@ from explorer.workspace.orientations.share import (
     orientation_share,
 )
 from explorer.workspace.orientations.tilts import (
-    GreatestTilt,
+    TiltByTorsion,
     greatest_tilts,
-    tilt_at_best_torsion,
+    tilt_by_torsion,
     tilt_map,
 )
 from explorer.workspace.workspace import Workspace
@@ -121,14 +121,14 @@ class PositionDrawing:
     """The share of orientations that a position can have, and the greatest tilts by torsion."""
 
     share: OrientationShare
-    best: GreatestTilt
+    by_torsion: TiltByTorsion
 
 
 def orientations_at(request: PositionRequest) -> PositionDrawing:
     """Return the orientations that a position can have."""
     design, position, tool = request
     share = orientation_share(design, position, tool=tool)
-    return PositionDrawing(share, tilt_at_best_torsion(design, position, tool))
+    return PositionDrawing(share, tilt_by_torsion(design, position, tool=tool))
 
 
 TiltsRequest: TypeAlias = tuple[Design, float, Triple | None]
