@@ -38,7 +38,7 @@ from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, LIFT, PAPER, 
 from explorer.app.features.optimise.feature import (
     OptimisePanel,
     charted_iterates,
-    data_of,
+    course,
 )
 from explorer.app.features.optimise.runner import Optimiser, result_of
 from explorer.app.features.optimise.state import (
@@ -538,9 +538,9 @@ def test_charts_are_of_one_start_and_of_the_demands() -> None:
     assert reach.values.tolist() == [each.objective for each in last]
     assert volume.values.tolist() == [each.volume for each in last]
     assert (volume.level, spare.level) == (7053.0, 0.0)
-    x, y, level = data_of(volume)
-    assert x.tolist() == list(range(len(last)))
-    assert len(y) == len(level) == len(x)
+    charts = "".join(course(run_of(AddIterates(run.number, iterates).apply(state)), state))
+    assert charts.count('class="curve"') == charts.count("<svg") == 3
+    assert charts.count('class="point"') == 3 * len(last)
     # An exact match is drawn as the least power.
     small = start()
     first, second = iterates_of(small, 2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
+import re
 import signal
 import time
 from collections.abc import Generator
@@ -43,10 +44,12 @@ from explorer.app.features.paths.panel import (
     plan_words,
 )
 from explorer.app.features.paths.plots import (
+    PLACE,
     LoadsAlong,
     crossing_time,
     crossing_words,
-    margin_columns,
+    margins_html,
+    margins_over,
 )
 from explorer.app.features.paths.state import STRAIGHT_SECONDS, End, Journey, Paths, journey_of
 from explorer.app.features.paths.work import DrivesRequest, draw_drives, request_for
@@ -268,24 +271,26 @@ def margins_of(pose: Pose) -> FloatArray:
 @pytest.mark.parametrize(("first", "last"), [(0, 7), (1, 4), (1, 5)])
 def test_chart_shows_margins_of_the_poses_over_time(first: int, last: int) -> None:
     journey = path_of(SetPathTime(3.0).apply(start_between(first, last)))
-    x, *curves, singular, now = margin_columns(journey, UNITS)
-    assert (np.diff(x) >= 0.0).all()
-    shown, is_singular = np.stack(curves, axis=1), np.isfinite(singular)
-    for t, values in zip(x[~is_singular], shown[~is_singular], strict=True):
-        np.testing.assert_allclose(values, margins_of(journey.pose_at(float(t))), atol=1e-6)
+    times, shown, singular = margins_over(journey, UNITS)
+    assert (np.diff(times) >= 0.0).all()
     crossings = journey.margins.crossings
-    times = [crossing_time(journey, i) for i in range(len(crossings))]
-    assert x[is_singular].tolist() == pytest.approx(times)
+    crossed = [crossing_time(journey, i) for i in range(len(crossings))]
+    assert singular[:, 0].tolist() == crossed
+    for t, values in zip(times.tolist(), shown, strict=True):
+        if t not in crossed:
+            np.testing.assert_allclose(values, margins_of(journey.pose_at(t)), atol=1e-6)
     # A singular pose is marked where its curve meets the line of a flat fold.
-    for crossing, values, marked in zip(
-        crossings, shown[is_singular], singular[is_singular], strict=True
-    ):
-        np.testing.assert_allclose(values, margins_of(crossing.pose), atol=1e-12)
-        assert marked == values[crossing.incidence - 1]
+    for crossing, (at, marked) in zip(crossings, singular.tolist(), strict=True):
+        values = margins_of(crossing.pose)
+        assert np.abs(shown[times == at] - values).max(axis=1).min() < 1e-12
+        assert abs(marked - values[crossing.incidence - 1]) < 1e-12
         assert abs(marked) < 1e-5
-    assert x[np.isfinite(now)].tolist() == [journey.at, journey.at]
-    low, high = now[np.isfinite(now)]
-    assert low < min(shown.min(), 0.0) < max(shown.max(), 0.0) < high
+    chart = margins_html(journey, UNITS)
+    assert chart.count("<circle") == len(crossings)
+    assert chart.count("<path") == 3
+    (now,) = re.findall('<line [^>]*class="now"', chart)
+    (x,) = {float(each) for each in re.findall('x[12]="([^"]*)"', now)}
+    assert x == pytest.approx(PLACE[0] + PLACE[1] * journey.at / times[-1], abs=1e-3)
 
 
 def test_path_and_its_crossings_are_drawn(services: Services) -> None:

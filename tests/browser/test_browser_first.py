@@ -115,7 +115,7 @@ def test_charts_of_a_path_are_no_wider_than_a_phone(browser: Browser, running: R
         tab.resize(PHONE)
         tab.page.get_by_text(re.compile("^Optimise · ")).click()
         tab.page.get_by_role("tab", name="Paths").click()
-        charts = tab.page.locator(".uplot:visible")
+        charts = tab.page.locator(".ex-course:visible")
         expect(charts).not_to_have_count(0)
         expect(tab.page.locator(".ex-drives")).to_be_visible()
         tab.settle()

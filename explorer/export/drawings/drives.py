@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from explorer.export.drawings.charts import Chart, ends_of
 from explorer.export.drawings.markup import coordinate, drawing_text, element, path_of
-from explorer.export.drawings.slices import ruler
-from explorer.mechanism.design import JOINTS
+from explorer.mechanism.design import JOINTS, Pair
 from explorer.mechanism.machine import or_infinite
 from explorer.mechanism.rgb import Rgb, css
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
 from explorer.paths.drives import PARTS, PathDrives
 
 # The width of the charts, the height of one over time and of that of forces and speeds, and the
@@ -27,8 +25,6 @@ _LOOKS = [
     {"stroke": css(_LEGS[leg]), "stroke_dasharray": "5 3" if d in (1, 3) else None, "fill": "none"}
     for d, leg in enumerate((0, 1, 1, 2, 2, 3))
 ]
-# Room beyond the values of an axis, as a share of their span.
-ROOM = 0.06
 
 
 def time_charts(drives: PathDrives) -> Element:
@@ -42,8 +38,8 @@ def time_charts(drives: PathDrives) -> Element:
     for title, name, values in charts:
         rows = _drawn(values)
         curves = [np.stack([_drawn(drives.time), row], axis=-1) for row in rows.T]
-        chart = _Chart((0.0, drives.law.duration), _ends([*rows.ravel(), 0.0]), top, HEIGHT)
-        pieces += chart.draw(title, name, curves)
+        chart = _chart((0.0, drives.law.duration), ends_of([*rows.ravel(), 0.0]), top, HEIGHT)
+        pieces += _draw(chart, title, name, curves)
         top += ABOVE + HEIGHT
     return _svg(top + BELOW, "Speeds, forces and powers of the actuators over time", pieces)
 
@@ -55,10 +51,10 @@ def force_speed_chart(drives: PathDrives) -> Element:
     # Lowest and highest values of both axes, shape (2, 2, 6).
     limits = np.array([[-speed, speed], [-pull, push]])
     both = np.stack([_drawn(drives.speed), _drawn(drives.force)])
-    ends = [_ends([*both[i].ravel(), *limits[i].ravel()]) for i in (0, 1)]
-    chart = _Chart(ends[0], ends[1], LEGEND, TALL)
+    ends = [ends_of([*both[i].ravel(), *limits[i].ravel()]) for i in (0, 1)]
+    chart = _chart(ends[0], ends[1], LEGEND, TALL)
     curves = [both[..., joint].T for joint in range(6)]
-    pieces = [*_legend(), *chart.draw("force (N)", "speed (mm/s)", curves)]
+    pieces = [*_legend(), *_draw(chart, "force (N)", "speed (mm/s)", curves)]
     # A side without a limit lies at the end of its axis.
     sides = np.clip(limits, *np.transpose(ends)[..., None, None])
     boxes = np.unique(sides.reshape(4, 6), axis=1).T if np.isfinite(limits).any() else ()
@@ -81,14 +77,6 @@ def _drawn(values: FloatArray) -> FloatArray:
     return np.delete(values, slice(1, None, len(PARTS)), axis=0)
 
 
-def _ends(values: Iterable[float]) -> tuple[float, float]:
-    """Return the ends of an axis of some values, leaving out those that are not finite."""
-    finite = [float(value) for value in values if np.isfinite(value)]
-    low, high = min(finite), max(finite)
-    room = ROOM * (high - low) or 1.0
-    return low - room, high + room
-
-
 def _legend() -> Iterator[Element]:
     for index, (name, look) in enumerate(zip(JOINTS, _LOOKS, strict=True)):
         x = LEFT + 48.0 * index
@@ -96,34 +84,13 @@ def _legend() -> Iterator[Element]:
         yield drawing_text(name, x + 24.0, 12.0)
 
 
-class _Chart(NamedTuple):
-    """The ends of both axes of a chart, its top and its height in the drawing."""
+def _chart(across: Pair, up: Pair, top: float, height: float) -> Chart:
+    return Chart(across, up, LEFT, WIDTH - LEFT - RIGHT, top + ABOVE, height)
 
-    across: tuple[float, float]
-    up: tuple[float, float]
-    top: float
-    height: float
 
-    def place(self, points: FloatArray) -> FloatArray:
-        """Return points (n, 2) of the chart as places in the drawing."""
-        (x0, x1), (y0, y1) = self.across, self.up
-        x = LEFT + (WIDTH - LEFT - RIGHT) * (points[:, 0] - x0) / (x1 - x0)
-        y = self.top + ABOVE + self.height * (y1 - points[:, 1]) / (y1 - y0)
-        return np.stack([x, y], axis=-1)
-
-    def draw(self, title: str, name: str, curves: Iterable[FloatArray]) -> Iterator[Element]:
-        """Yield axes and curves; the axis across has numbers if it has a name."""
-        origin = np.array([[self.across[0], self.up[0]], [self.across[1], self.up[1]]])
-        (left, bottom), (right, top) = self.place(origin).tolist()
-        (width, height), (x, y) = (right - left, bottom - top), np.diff(origin, axis=0)[0]
-
-        def words(value: float) -> str:
-            return format_number(value, 5) if name else ""
-
-        yield drawing_text(title, 4.0, top - 8.0, "axis")
-        yield ruler(
-            name, self.across, left, width / x, across=bottom, up=False, grid=height, words=words
-        )
-        yield ruler("", self.up, bottom, height / y, across=left, up=True, grid=width)
-        for curve, look in zip(curves, _LOOKS, strict=True):
-            yield element("path", d=path_of(self.place(curve), "", decimals=1), **look)
+def _draw(chart: Chart, title: str, name: str, curves: Iterable[FloatArray]) -> Iterator[Element]:
+    """Yield axes and curves; the axis across has numbers if it has a name."""
+    yield drawing_text(title, 4.0, chart.top - 8.0, "axis")
+    yield from chart.axes(name, has_numbers=name != "")
+    for curve, look in zip(curves, _LOOKS, strict=True):
+        yield chart.curve(curve, **look)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import datetime as dt
-import math
 import shlex
 from collections.abc import Callable, Iterable, Iterator
 from hashlib import sha256
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
 from explorer import __version__
 from explorer.errors import ExplorerError
 from explorer.export.drawings import markup
+from explorer.export.drawings.charts import search_chart
 from explorer.export.drawings.markup import Piece, Row, drawing_style, element, paragraph, whole
 from explorer.export.drawings.mechanism import WIDTH, cover_drawing, svg_drawing
-from explorer.export.drawings.slices import ruler
 from explorer.export.report import mechanism, workspace
 from explorer.export.report.data import ReportData
 from explorer.files.packaged import packaged_file, versions
@@ -24,14 +21,8 @@ from explorer.measures.blocks import commands
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import encode_design
-from explorer.numerics.number_text import UNITS, format_number, power_of_ten
-from explorer.optimise.outcome import (
-    GOALS,
-    OBJECTIVE_SYMBOLS,
-    Curve,
-    Record,
-    curves_of,
-)
+from explorer.numerics.number_text import UNITS, format_number
+from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Curve, Record, curves_of
 from explorer.optimise.problem import REACH, YAW
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
@@ -173,7 +164,8 @@ def charts(record: Record) -> Element | None:
     for index, curve in enumerate(curves):
         left = index * width + LEFT
         drawn.append(markup.drawing_text(_title(record, curve), left - 30.0, 13.0, "title"))
-        drawn.extend(_chart(curve, left, width - LEFT - RIGHT))
+        inner, height = width - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
+        drawn.extend(search_chart(curve, left, inner, TOP, height))
     return svg_drawing(HEIGHT, "The search, by iterations", *drawn)
 
 
@@ -187,46 +179,6 @@ def _title(record: Record, curve: Curve) -> str:
     objective = record.problem.objective
     unit = CATALOGUE[GOALS[objective]].unit_in(UNITS).name
     return f"{OBJECTIVE_SYMBOLS[objective].capitalize()}{f' ({unit})' if unit else ''}"
-
-
-def _chart(curve: Curve, left: float, width: float) -> Iterator[Element]:
-    low, high = _range(curve)
-    last = float(max(1, len(curve.values) - 1))
-    bottom, upwards = HEIGHT - BOTTOM, (HEIGHT - TOP - BOTTOM) / (high - low)
-    yield ruler("iteration", (0.0, last), left, width / last, across=bottom, up=False, whole=True)
-    yield ruler(
-        "",
-        (low, high),
-        bottom,
-        upwards,
-        across=left,
-        up=True,
-        whole=curve.powers,
-        grid=width,
-        words=lambda value: power_of_ten(round(value)) if curve.powers else format_number(value, 5),
-    )
-    if curve.level is not None:
-        y = bottom - upwards * (curve.level - low)
-        yield markup.line(((left, y), (left + width, y)), "level")
-    index = np.flatnonzero(np.isfinite(curve.values))
-    x, y = left + width * index / last, bottom - upwards * (curve.values[index] - low)
-    points = np.stack([x, y], axis=-1, dtype=np.float64)
-    if len(index):
-        yield element("path", d=markup.path_of(points, ""), class_="curve")
-    if len(index) <= 60:
-        for x, y in points.tolist():
-            yield element("circle", cx=x, cy=y, r=2.2, class_="point")
-
-
-def _range(curve: Curve) -> tuple[float, float]:
-    values = [*curve.values.tolist(), *([] if curve.level is None else [curve.level])]
-    finite = [value for value in values if math.isfinite(value)] or [0.0]
-    low, high = min(finite), max(finite)
-    if curve.powers:
-        low = math.floor(low)
-        return float(low), float(max(math.ceil(high), low + 1))
-    room = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
-    return low - room, high + room
 
 
 def _reproduction(data: ReportData) -> Iterator[Element]:

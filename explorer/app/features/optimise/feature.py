@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from html import escape
-from itertools import zip_longest
 
-import numpy as np
 import viser
-from numpy.typing import NDArray
-from viser import uplot
 
 from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
 from explorer.app.features.optimise.actions import SetObjective
@@ -27,11 +22,11 @@ from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets import charts
 from explorer.app.widgets.buttons import activity
+from explorer.export.drawings.charts import search_chart
+from explorer.export.drawings.markup import page_picture
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
-from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import Unit, format_number
 from explorer.optimise.outcome import (
     OBJECTIVE_SYMBOLS,
@@ -56,10 +51,8 @@ FREE_LABELS = {YAW: "yaw of home"}
 STEP = 0.001
 COLUMNS = '<div class="ex-columns"></div>'
 """Markup that makes the stylesheet put what follows it in a tab side by side."""
-# Height of a chart, in pixels.
-HEIGHT = 96
-# Padding of an axis beyond the values, as a share of their span.
-PADDING = 0.12
+# Width and height of a chart with its axes, and its place in that, in pixels.
+SIZE, PLACE = "0 0 280 120", (48.0, 222.0, 6.0, 78.0)
 
 
 class OptimisePanel:
@@ -157,47 +150,38 @@ def _request(state: State) -> OptimisationRequest:
 
 
 class OptimisePlots:
-    """Captions and charts in a folder; hidden until there is a run."""
+    """Charts with captions in a folder; hidden until there is a run."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        values = charts.line("value", charts.BLUE)
-        # uPlot shows points only where they do not touch.
-        values["points"] = {"size": 5, "fill": css(charts.BLUE)}
-        series = values, charts.line("level", charts.ORANGE, width=1.0, dash=(4, 4))
-        plain: uplot.Axis = {"gap": 3, "ticks": {"size": 4}, "font": charts.FONT}
-        axes: tuple[uplot.Axis, ...] = (
-            {**plain, "size": 20, "space": 40},
-            {**plain, "size": 50, "space": 16},
-        )
         self._folder = gui.add_folder("Course of the search", visible=False)
         with self._folder:
-            self._charts = [
-                (
-                    gui.add_html("", visible=False),
-                    charts.add_chart(gui, series, axes, height=HEIGHT, padding=(6, 14, 0, 0)),
-                )
-                for _ in range(3)
-            ]
+            self._html = gui.add_html("")
+        # The run and the unit that are drawn.
+        self._drawn: tuple[SearchRun | None, Unit] | None = None
 
     def updates(self, state: State) -> Iterator[Update]:
         """Yield the updates that show the run of a state."""
         run = Optimisation.of(state).run
-        iterates = [] if run is None else charted_iterates(run)
-        drawn = [] if run is None or not iterates else curves_of(run.problem, iterates)
-        yield self._folder, "visible", bool(drawn)
-        for (caption, chart), curve in zip_longest(self._charts, drawn):
-            yield caption, "visible", curve is not None
-            yield chart, "visible", curve is not None
-            if run is not None and curve is not None:
-                is_plain = curve.kind == "spare" or curve.powers
-                goal = "match-volume" if curve.kind == "volume" else run.problem.objective
-                unit = Unit("") if is_plain else goal_unit(goal, state)
-                level = None if curve.level is None else unit.factor * curve.level
-                shown = replace(curve, values=unit.factor * curve.values, level=level)
-                name = escape(_name(run.problem, iterates[-1], shown, unit))
-                yield caption, "content", f'<div class="ex-note ex-dim ex-cut">{name}</div>'
-                yield chart, "scales", _scales(shown)
-                yield chart, "data", data_of(shown)
+        if self._drawn is not None and self._drawn[0] is run and self._drawn[1] == state.unit:
+            return
+        self._drawn = run, state.unit
+        charts = "" if run is None else "".join(course(run, state))
+        yield self._folder, "visible", charts != ""
+        yield self._html, "content", charts
+
+
+def course(run: SearchRun, state: State) -> Iterator[str]:
+    """Yield the charts of a run, each with its caption, as HTML in the unit of a state."""
+    iterates = charted_iterates(run)
+    for curve in curves_of(run.problem, iterates) if iterates else ():
+        is_plain = curve.kind == "spare" or curve.powers
+        goal = "match-volume" if curve.kind == "volume" else run.problem.objective
+        unit = Unit("") if is_plain else goal_unit(goal, state)
+        level = None if curve.level is None else unit.factor * curve.level
+        shown = replace(curve, values=unit.factor * curve.values, level=level)
+        name = _name(run.problem, iterates[-1], shown, unit)
+        yield f'<div class="ex-note ex-dim ex-cut">{escape(name)}</div>'
+        yield page_picture("ex-map ex-course", name, *search_chart(shown, *PLACE), viewBox=SIZE)
 
 
 def charted_iterates(run: SearchRun) -> list[Iterate]:
@@ -216,30 +200,9 @@ def _name(problem: Problem, last: Iterate, curve: Curve, unit: Unit) -> str:
         target = "" if curve.level is None else f", required {format_number(curve.level, 6)}"
         return f"Volume: {unit.text(last.volume, 6)}{target}"
     if curve.powers:
-        value = format_number(last.objective, 2, size=1.0)
-        return f"log10 of F = |1 − V / V′|; F = {value}"
+        return f"F = |1 − V / V′|: {format_number(last.objective, 2, size=1.0)}"
     name = OBJECTIVE_SYMBOLS[problem.objective].capitalize()
     return f"{name}: {unit.text(last.objective, 6)}"
-
-
-def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
-    """Return the columns of a chart: iterations, values, and the level or nothing."""
-    x = np.arange(len(curve.values), dtype=np.float64)
-    return x, curve.values, np.full(len(x), np.nan if curve.level is None else curve.level)
-
-
-def _scales(curve: Curve) -> dict[str, uplot.Scale]:
-    last = max(1.0, len(curve.values) - 1.0)
-    levels = [] if curve.level is None else [curve.level]
-    heights = [value for value in (*curve.values.tolist(), *levels) if math.isfinite(value)]
-    low, high = min(heights, default=0.0), max(heights, default=0.0)
-    if curve.powers:
-        low = math.floor(low)
-        edges = float(low), float(max(math.ceil(high), low + 1))
-    else:
-        room = PADDING * (high - low) or 0.05 * abs(high) or 1.0
-        edges = low - room, high + room
-    return {"x": {"time": False, "range": (0.0, last)}, "y": {"range": edges}}
 
 
 TAB = "Optimise"

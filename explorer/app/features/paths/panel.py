@@ -124,7 +124,7 @@ class PathsPanel:
                 _time_span,
                 disabled=lambda state: journey_of(state) is None,
             )
-            self._margins = plots.MarginPlot(gui)
+            self._margins = gui.add_html("", visible=False)
         with gui.add_folder("Drives"):
             self._drives = DrivesPanel(services, self._controls)
         services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
@@ -166,8 +166,10 @@ class PathsPanel:
         title = plan_words(state) or path_title(state, self._loads.shares(frame), self._clear)
         yield self._title, "content", title
         yield from show_html(self._demand, plots.demand_note(state))
-        for part in (self._margins, self._drives):
-            yield from part.updates(frame)
+        journey = journey_of(state)
+        margins = "" if journey is None else plots.margins_html(journey, state.unit)
+        yield from show_html(self._margins, margins)
+        yield from self._drives.updates(frame)
         yield from self._controls.updates(frame)
 
     def _add_end(self, gui: viser.GuiApi, end: EndName) -> viser.GuiHtmlHandle:

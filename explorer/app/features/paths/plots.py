@@ -3,45 +3,38 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import lru_cache
 from html import escape
-from typing import Any, NamedTuple
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
 
 import numpy as np
-import viser
-from numpy.typing import ArrayLike, NDArray
 
-from explorer.app.features.feature import Services, show_html
+from explorer.app.features.feature import Services
 from explorer.app.features.loads.load import Loads
 from explorer.app.features.paths.state import Journey, Paths, journey_of
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.charts import (
-    NEUTRAL,
-    ORANGE,
-    add_chart,
-    axis,
-    dots,
-    level_axis,
-    line,
-)
+from explorer.app.widgets.charts import ORANGE
 from explorer.app.widgets.markup import margin_name, note, swatch
+from explorer.export.drawings.charts import Chart, ends_of
+from explorer.export.drawings.markup import circle, drawing_text, line, page_picture
 from explorer.measures.blocks.block import MOST_SHARE, Share
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
+from explorer.mechanism.rgb import css
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_decimals, format_number
-from explorer.page.widgets.assigning import Updates
 from explorer.paths.loads import DemandedLoad, PathLoads
 from explorer.singularity.colours import MARGIN_COLOURS
 from explorer.statics.reactions import PART_NAMES, has_limits
 
 # Dashes of the margins' lines beside their colours, and the marks of the legend.
-DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
+DASHES = (None, "7 3", "2 3")
 STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
-# Room above and below the values of a chart, as a share of their span.
-ROOM = 0.08
-# Height of the chart, and the room for the numbers of time in it, in pixels.
-HEIGHT, TIME_ROOM = 112, 26
+# Width and height of the chart with its axes, and its place in that, in pixels.
+SIZE, PLACE = "0 0 280 112", (46.0, 204.0, 6.0, 82.0)
 # Number of crossings that are listed; the others are counted.
 MOST_LISTED = 4
 
@@ -81,79 +74,49 @@ def demand_note(state: State) -> str:
     return note("No part has a limit, so every load is held: see the tab Machine.")
 
 
-# The columns of the chart while there is no path: a second without values.
-BLANK = (np.ones(2), *np.full((4, 2), np.nan), np.array([-1.0, 1.0]))
+def margins_html(journey: Journey, unit: Unit) -> str:
+    """Return the margins of the present pose of a path in a unit, and their chart, as HTML."""
+    chart, pieces = _chart_of(replace(journey, at=0.0, is_playing=False), unit)
+    now = line(chart.place([(journey.at, end) for end in chart.up]), "now")
+    words = "Margins over the time of the path"
+    drawn = page_picture("ex-map ex-course", words, *pieces, now, viewBox=SIZE)
+    return legend(journey.pose, unit) + drawn
 
 
-class MarginPlot:
-    """The chart of the margins over time and its legend, empty while there is no path.
+@lru_cache(maxsize=1)
+def _chart_of(journey: Journey, unit: Unit) -> tuple[Chart, tuple[Element, ...]]:
+    """Return the chart of the margins over a path, which is at its start, and its drawing.
 
     Its axis of time has no words: the slider above names it.
     """
-
-    def __init__(self, gui: viser.GuiApi) -> None:
-        self._legend = gui.add_html("", visible=False)
-        lines = (
-            line(f"δ{index}", colour, dash=dash)
-            for index, colour, dash in zip((1, 2, 3), MARGIN_COLOURS, DASHES, strict=True)
-        )
-        self._chart = add_chart(
-            gui,
-            (*lines, dots("singular", ORANGE, 9), line("now", NEUTRAL, width=1.5)),
-            (
-                axis("", label_size=0, size=TIME_ROOM),
-                axis("margin δ", label_size=18, size=40, space=18),
-                level_axis((0.0,), "flat", ORANGE),
-            ),
-            height=HEIGHT,
-            padding=(8, 0, 0, 0),
-        )
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the chart and its legend show the frame."""
-        journey, unit = journey_of(frame.state), frame.state.unit
-        columns = BLANK if journey is None else margin_columns(journey, unit)
-        duration = max(float(columns[0][-1]), 1e-9)
-        span = float(np.nanmin(columns[-1])), float(np.nanmax(columns[-1]))
-        scales = {"x": {"time": False, "range": (0.0, duration)}, "y": {"range": span}}
-        yield self._chart, "scales", scales
-        yield self._chart, "data", columns
-        # viser's chart draws no numbers below it if it appears while it is given data time after
-        # time; so it does not wait for a path that is played at once.
-        yield self._chart, "visible", True
-        words = "" if journey is None else legend(journey.pose, unit)
-        yield from show_html(self._legend, words)
+    time, values, singular = margins_over(journey, unit)
+    chart = Chart((0.0, float(time[-1])), ends_of([*values.ravel(), 0.0]), *PLACE)
+    (x, y), level = chart.place((time[-1], 0.0)).tolist(), chart.level(0.0, "level")
+    flat = level, drawing_text("flat", x + 5.0, y + 4.0)
+    curves = (
+        chart.curve(np.column_stack([time, row]), stroke=css(colour), stroke_dasharray=dash)
+        for row, colour, dash in zip(values.T, MARGIN_COLOURS, DASHES, strict=True)
+    )
+    marks = (circle(at, 4.5, fill=css(ORANGE)) for at in chart.place(singular).tolist())
+    return chart, (*chart.axes("", up_name="δ"), *flat, *curves, *marks)
 
 
-def margin_columns(journey: Journey, unit: Unit) -> tuple[NDArray[Any], ...]:
-    """Return the columns of the chart: time, margins in a unit, singular poses, present time.
+def margins_over(journey: Journey, unit: Unit) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return times (n,) along a path, the margins (n, 3) then, and its singular poses (k, 2).
 
-    The line at the present goes from the bottom to the top of the chart.
+    A singular pose is given by its time, which is among the others, and the margin that vanishes.
     """
     timed, crossings = journey.trajectory, journey.margins.crossings
-    poses = [*(crossing.pose for crossing in crossings), journey.pose, journey.pose]
-    values = unit.factor * margins(
-        np.concatenate([timed.position, [pose.position for pose in poses]]),
-        np.concatenate(
-            [rotation_from_quaternion(timed.quaternion), [pose.rotation for pose in poses]]
-        ),
-    )
-    singular, now = np.full((2, len(values)), np.nan)
-    for row, crossing in enumerate(crossings, start=len(timed.time)):
-        singular[row] = values[row, crossing.incidence - 1]
-    crossing_times = [crossing_time(journey, index) for index in range(len(crossings))]
-    times = np.concatenate([timed.time, crossing_times, [journey.at, journey.at]])
-    # Without the present pose: the axis must not change while the path is played.
-    now[-2:] = span_of(np.append(values[:-2], 0.0))
-    order = np.argsort(times, kind="stable")
-    return tuple(column[order] for column in (times, *values.T, singular, now))
-
-
-def span_of(values: ArrayLike) -> tuple[float, float]:
-    """Return the bottom and the top of a chart of some values, with room beyond them."""
-    low, high = float(np.min(values)), float(np.max(values))
-    room = ROOM * (high - low) or 1.0
-    return low - room, high + room
+    times = np.array([crossing_time(journey, index) for index in range(len(crossings))])
+    places = np.reshape([each.pose.position for each in crossings], (-1, 3))
+    turns = np.reshape([each.pose.rotation for each in crossings], (-1, 3, 3))
+    there = unit.factor * margins(places, turns)
+    along = unit.factor * margins(timed.position, rotation_from_quaternion(timed.quaternion))
+    vanishing = [row[each.incidence - 1] for row, each in zip(there, crossings, strict=True)]
+    time = np.concatenate([timed.time, times])
+    order = np.argsort(time, kind="stable")
+    values = np.concatenate([along, there])[order]
+    return time[order], values, np.column_stack([times, vanishing])
 
 
 def crossing_time(journey: Journey, index: int) -> float:
