@@ -32,7 +32,7 @@ from page_props import differences, shown_by
 from server_clock import wait_until_drawn
 from socket_tab import SocketTab
 
-from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
+from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.paths.state import Paths, journey_of
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
@@ -205,9 +205,6 @@ class Monkey:
                 saved.wait_until_idle()
             shelves[0].entries = shelves[1].entries
             shelves[0].last_deleted = shelves[1].last_deleted
-            # The question in the list is no state.
-            lists = [each.services.get(DesignsPanel) for each in (fresh.page, page)]
-            lists[0].asked = lists[1].asked
             session.redraw()
             assert wait_until_drawn(fresh.page, PATIENCE_SECONDS)
             self.report.drift += differences(shown_by(self.running), shown_by(fresh))
