@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from functools import partial
 from html import escape
-from typing import TypeAlias
 
 from explorer.app.features.feature import Services, html_of
-from explorer.app.session.feed import Feed, FeedOf
+from explorer.app.session.feed import FeedOf
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import with_machine
@@ -37,7 +36,6 @@ def _request_for(frame: Frame) -> Design | None:
     return None if frame.state.busy else frame.state.design
 
 
-BuildFeed: TypeAlias = Feed[Design, Buildability]
 BUILD_FEED = FeedOf(buildability, _request_for)
 
 
