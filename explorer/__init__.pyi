@@ -20,6 +20,7 @@ from .find.requirement import (
 from .legs.clearance import leg_clearances as leg_clearances
 from .legs.interference import tetrahedra_overlap as tetrahedra_overlap
 from .measures.snapshot import Snapshot as Snapshot, evaluate as evaluate
+from .mechanism.built_machine import BuiltMachine as BuiltMachine
 from .mechanism.configuration import Configuration as Configuration, tool_position as tool_position
 from .mechanism.design import JOINTS as JOINTS, Design as Design, Limits as Limits
 from .mechanism.design_file import (

@@ -113,7 +113,7 @@ STIFFNESSES: Six = (STIFFNESS, STIFFNESS, STIFFNESS, STIFFNESS, STIFFNESS, STIFF
 def typical_machine(design: Design) -> tuple[Design, tuple[str, ...]]:
     """Return a design with typical values in place of those that it leaves out, and words for each.
 
-    Errors of the actuators count as left out if all six are zero, tolerances if all 23 are. There
+    Errors of the actuators count as left out if all six are zero, tolerances if all 25 are. There
     are no words for a design that states everything.
     """
     assumed: list[str] = []
@@ -129,7 +129,8 @@ def typical_machine(design: Design) -> tuple[Design, tuple[str, ...]]:
         assumed.append(f"struts of tube {OUTER:g} × {INNER:g} mm, {struts.modulus_gpa:g} GPa")
     if not any(tolerances.stated):
         each: Triple = (LENGTH, LENGTH, LENGTH)
-        tolerances = Tolerances(each, each, each, (TILT, TILT), each, each, each, each)
+        tilts = TILT, TILT
+        tolerances = Tolerances(each, each, each, tilts, each, each, each, each, tilts)
         assumed.append(f"tolerances {LENGTH:g} mm and {TILT:g}°")
     filled = msgspec.structs.replace(
         design, actuators=actuators, struts=struts, tolerances=tolerances

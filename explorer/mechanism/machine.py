@@ -38,9 +38,14 @@ DIMENSIONS = (
     *(f"guide {axis}" for axis in "xyz"),
     *("guide tilt y", "guide tilt z"),
     *(f"b{point}{axis}" for point in (1, 2, 3, 4) for axis in "xyz"),
+    *("strut 2 tilt", "strut 3 tilt"),
 )
-"""The 23 geometric dimensions: points of the base, offset and tilt of the guide, points of the
-platform, in the order of every array axis of 23."""
+"""The 25 geometric dimensions: points of the base, offset and tilt of the guide, points of the
+platform, and tilts of struts 2 and 3 along the guide, in the order of every array axis of 25."""
+
+A1, A3, GUIDE, TILT, PLATFORM, STRUTS = map(slice, (0, 3, 6, 9, 11, 23), (3, 6, 9, 11, 23, 25))
+"""The places among the `DIMENSIONS` of a1, a3, offset and tilt of the guide, b1 to b4, and tilts of
+the struts."""
 
 
 class Tool(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -242,13 +247,15 @@ class Guide(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Tolerances(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Largest deviations of the 23 geometric dimensions to either side.
+    """Largest deviations of the 25 geometric dimensions to either side.
 
     Attributes:
         a1, a3: Of these points along the axes of the base, in millimetres.
         guide: Of the guide's offset along the axes of the base, in millimetres.
         guide_tilt_deg: Of the guide's turn about y and z through a1, in degrees.
         b1, b2, b3, b4: Of these points along the axes of the platform, in millimetres.
+        square_deg: Of the tilts of struts 2 and 3 along the guide, to which they are square, in
+            degrees.
 
     Raises:
         DesignError: A tolerance is negative or not finite.
@@ -262,11 +269,12 @@ class Tolerances(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     b2: Triple = (0.0, 0.0, 0.0)
     b3: Triple = (0.0, 0.0, 0.0)
     b4: Triple = (0.0, 0.0, 0.0)
+    square_deg: Pair = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in self.__struct_fields__:
             field, values = f"tolerances.{name}", getattr(self, name)
-            given = two(field, values) if name == "guide_tilt_deg" else numbers(field, values, 3)
+            given = two(field, values) if name.endswith("_deg") else numbers(field, values, 3)
             _set(self, name, tuple(not_negative(field, value) for value in given))
 
     @property

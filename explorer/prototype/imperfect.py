@@ -1,8 +1,7 @@
-"""A machine that deviates from its design: other dimensions, and encoders with offsets.
+"""A machine that deviates from its design, as a chain of bodies: drawn at random, at home.
 
-Nothing is linear here. Each leg is the one of the design, moved as a whole: legs 1 and 4 with a1
-and a3, legs 2 and 3 with the guide, whose tilt is the rotation by the vector (0, y, z) about a1.
-The ends b1 to b4 lie elsewhere on the platform.
+A leg is the one of the design, moved as a whole. A strut that leans along the guide turns the rod
+in its cylinder, whose axis is the guide's.
 """
 
 from __future__ import annotations
@@ -15,44 +14,28 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError, NoAnswerError
+from explorer.mechanism.built_machine import BuiltMachine
 from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import inverse, joint_array
-from explorer.mechanism.margins import margins, mode_of
+from explorer.mechanism.kinematics import inverse
+from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.pose import Pose, rotation_array
-from explorer.motion.chains import ACTUATED, Chains, Places
-from explorer.numerics.arrays import FloatArray, finite_array, position_array
+from explorer.motion.chains import Chains, Places
+from explorer.numerics.arrays import FloatArray, position_array
 from explorer.statics import accuracy
 from explorer.statics.accuracy import SOURCES
 from explorer.statics.compliance import is_elastic
 
-# Largest error of the joints of a solved pose, as a share of the reach.
-CLOSED = 1e-12
-
 
 @dataclass(frozen=True, eq=False)
-class ImperfectMachine:
-    """A machine of a design, with its deviations.
+class ImperfectMachine(BuiltMachine):
+    """A machine of a design, with its deviations, whose bodies can be placed.
 
     Attributes:
-        design: The manipulator.
-        deviations: Deviations of the sources of errors, shape (29,), in the order of
-            `explorer.statics.accuracy.SOURCES`: the offsets of the encoders of the six actuators,
-            then the 23 dimensions. Lengths are in design units, tilts in radians.
-        seed: Seed with which they were drawn; None if they were not.
-
-    Raises:
-        InputError: The deviations are not 29 finite numbers.
+        seed: Seed with which the deviations were drawn; None if they were not.
     """
 
-    design: Design
-    deviations: FloatArray
     seed: int | None = None
-
-    def __post_init__(self) -> None:
-        given = finite_array("deviations", self.deviations, (len(SOURCES),))
-        if given.ndim != 1:
-            raise InputError("a machine has one set of deviations, not a batch")
 
     @staticmethod
     def draw(design: Design, seed: int) -> ImperfectMachine:
@@ -74,30 +57,6 @@ class ImperfectMachine:
         drawn = errors * np.random.default_rng(seed).uniform(-1.0, 1.0, len(SOURCES))
         return ImperfectMachine(design, drawn, seed)
 
-    @property
-    def encoder_offsets(self) -> FloatArray:
-        """True joint values less those that the encoders read, shape (6,), in design units."""
-        return self.deviations[:6]
-
-    @cached_property
-    def points(self) -> FloatArray:
-        """True b1, b2, b3 and b4 in the platform frame, shape (4, 3), in design units."""
-        return self.design.platform_points + self.deviations[6 + accuracy.B_COLUMN :].reshape(4, 3)
-
-    @cached_property
-    def shifts(self) -> FloatArray:
-        """Displacements of the four legs' bases, shape (4, 3), in design units."""
-        guide = accuracy.GUIDE_COLUMN
-        starts = np.array([accuracy.A1_COLUMN, guide, guide, accuracy.A3_COLUMN])
-        return self.deviations[6 + starts[:, None] + np.arange(3)]
-
-    @cached_property
-    def turns(self) -> FloatArray:
-        """Rotations of the four legs' bases about a1, shape (4, 3, 3)."""
-        tilt = [0.0, *self.deviations[6 + accuracy.TILT_COLUMN : 8 + accuracy.TILT_COLUMN]]
-        guide = Rotation.from_rotvec(tilt).as_matrix()
-        return np.stack([np.eye(3), guide, guide, np.eye(3)])
-
     @cached_property
     def _chains(self) -> Chains:
         return Chains.of(self.design)
@@ -108,16 +67,19 @@ class ImperfectMachine:
         The position (3,) is that of the platform's frame, the rotation (3, 3) platform to base.
         """
         p, r = position_array("position", position), rotation_array(rotation)
-        ends = p + self.points @ r.T
         # Seen from its base, a leg is that of the design at another position of the platform.
-        seen = np.einsum("kji,kj->ki", self.turns, ends - self.shifts)
-        positions = seen - self.design.platform_points @ r.T
-        values = self._chains.joints(positions, r).reshape(4, 4, 3)
-        return values[range(4), range(4)].ravel()
+        positions = self.ends_seen(p[None], r[None])[0] - self.design.platform_points @ r.T
+        values = self._chains.joints(positions, r).reshape(4, 4, 3)[range(4), range(4)]
+        values[1:3, 0] -= values[1:3, 2] * np.tan(self.strut_tilts)
+        values[1:3, 2] /= np.cos(self.strut_tilts)
+        return values.ravel()
 
     def places(self, joints: FloatArray, position: ArrayLike, rotation: ArrayLike) -> Places:
         """Return the placements of all bodies in a pose with these true joint values (12,)."""
         origin, turn = self._chains.places(joints, position, rotation)
+        for leg, rod, tilt in zip((2, 3), (6, 9), self.strut_tilts.tolist(), strict=True):
+            turn[rod] = turn[rod] @ Rotation.from_rotvec([0.0, tilt, 0.0]).as_matrix()
+            origin[rod] = origin[rod - 1] + turn[rod, :, 2] * joints[3 * leg - 1]
         legs = slice(1, 13)
         turns, shifts = np.repeat(self.turns, 3, axis=0), np.repeat(self.shifts, 3, axis=0)
         origin[legs] = shifts + np.einsum("kij,kj->ki", turns, origin[legs])
@@ -127,37 +89,21 @@ class ImperfectMachine:
     def pose(self, joints: ArrayLike, near: Pose) -> Pose:
         """Return the true pose in which the encoders read the joints, shape (6,), in design units.
 
-        A pose close to it, such as the one in which the design has these joints, is known.
+        A pose of the same assembly mode, such as the one of the design, is known.
 
         Raises:
             InputError: The joints are not usable.
             NoAnswerError: There is no such pose in the assembly mode of the pose nearby.
         """
-        from scipy.optimize import least_squares
-
-        true = joint_array(joints) + self.encoder_offsets
-        size, position, rotation = self.design.reach, np.array(near.position), near.rotation
-
-        def pose_at(twist: FloatArray) -> tuple[FloatArray, FloatArray]:
-            turn = Rotation.from_rotvec(twist[3:]).as_matrix()
-            return position + size * twist[:3], turn @ rotation
-
-        def unmet(twist: FloatArray) -> FloatArray:
-            return (self.chain_joints(*pose_at(twist))[list(ACTUATED)] - true) / size
-
-        solution = least_squares(
-            unmet, np.zeros(6), method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15
-        )
-        pose = Pose.of(*pose_at(solution.x))
-        scale = max(1.0, float(np.abs(true).max()) / size)
-        modes = [mode_of(margins(each.position, each.rotation)) for each in (near, pose)]
-        if np.abs(unmet(solution.x)).max() > CLOSED * scale or modes[0] != modes[1]:
+        mode = mode_of(margins(near.position, near.rotation))
+        pose = self.forward(joints, signs_of(int(mode)))
+        if not pose.closes or mode_of(margins(pose.position, pose.rotation)) != mode:
             raise NoAnswerError(
                 "the legs of the machine that deviates do not close near the pose of the design: "
                 "the errors are too large so close to singular poses; make them smaller, or "
                 "choose another home"
             )
-        return pose
+        return Pose.of(pose.position, pose.rotation)
 
     @cached_property
     def home(self) -> Pose:

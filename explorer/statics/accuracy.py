@@ -1,4 +1,4 @@
-"""Errors of the tool from its 29 sources: the actuators' errors and the geometric dimensions.
+"""Errors of the tool from its 31 sources: the actuators' errors and the geometric dimensions.
 
 The model is linear: the tool moves by J⁻¹ times the errors of the joints, and by −J⁻¹ ∂q/∂g times
 the errors of the dimensions g while the actuators hold their values. The sums Σ e_i v_i for errors
@@ -7,9 +7,8 @@ e_i within ±b_i fill a zonotope, whose farthest vertex is the exact worst error
 Errors are independent, and each is uniform within ± its bound, as those of the machines that
 `explorer.prototype.imperfect` draws. Root-mean-square errors are those of this model.
 
-No source is the squareness of struts 2 and 3 to the guide: an angle ε between a strut and the plane
-across the guide has the effect of an error of d1 by d2 ε, or of d3 by d4 ε. Play in the joints and
-the straightness of the guide are left out, too.
+A strut that leans along the guide by an angle ε has the effect of an error of d1 by −d2 ε, or of d3
+by −d4 ε. Play in the joints and the straightness of the guide are no sources.
 """
 
 from __future__ import annotations
@@ -22,15 +21,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
-from explorer.mechanism.machine import DIMENSIONS
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.machine import A1, A3, DIMENSIONS, GUIDE, PLATFORM, STRUTS, TILT
 from explorer.motion.inverse_jacobian import twists_of_actuators
-from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, lengths_of
+from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, lengths_of, rotate
 from explorer.numerics.computed_once import computed_once
 from explorer.numerics.zonotope import signs_of_longest_sums
-
-# First columns of the dimensions, in the order of `DIMENSIONS`.
-A1_COLUMN, A3_COLUMN, GUIDE_COLUMN, TILT_COLUMN, B_COLUMN = 0, 3, 6, 9, 11
 
 UNIFORM = 1.0 / math.sqrt(3.0)
 """Standard deviation of an error that is uniform within ± its bound, over the bound."""
@@ -38,9 +34,7 @@ UNIFORM = 1.0 / math.sqrt(3.0)
 RMS_ERRORS = "independent errors, each uniform within its bounds"
 """The errors behind each root-mean-square error, in words."""
 
-NO_SOURCES = (
-    "squareness of struts 2 and 3 to the guide, play in the joints, straightness of the guide"
-)
+NO_SOURCES = "play in the joints, straightness of the guide"
 """Errors of a machine that are no sources, in words."""
 
 # Signs of the actuators' errors at the corners of their cube, up to a common sign, shape (6, 32),
@@ -103,36 +97,32 @@ def worst_errors(configuration: Configuration, errors: ArrayLike) -> ToolError:
 
 @computed_once
 def error_by_geometry(configuration: Configuration) -> FloatArray:
-    """Return the tool's error per error of each dimension, −J⁻¹ ∂q/∂g, shape (..., 6, 23).
+    """Return the tool's error per error of each dimension, −J⁻¹ ∂q/∂g, shape (..., 6, 25).
 
     Rows are the displacement and the turn of the tool, base axes, while the actuators hold their
     values. Columns have the order of `explorer.mechanism.machine.DIMENSIONS`: a1, a3 and the
-    guide's offset along base axes, the guide's tilt about y and z through a1, and b1 to b4 along
-    platform axes. Offsets are in design units, tilts in radians. All entries are infinite in a
+    guide's offset along base axes, the guide's tilt about y and z through a1, b1 to b4 along
+    platform axes, and the tilts of struts 2 and 3 along the guide. Offsets are in design units,
+    tilts in radians. All entries are infinite in a
     singular pose.
     """
     c, twists = configuration, twists_of_actuators(configuration)
-    r, u = c.rotation, c.leg_directions
-    # ∂q/∂g, with the joint of a length in each row of legs.
-    slopes, ends = np.zeros((*c.batch, 6, len(DIMENSIONS))), u @ r
-    slopes[..., 0, A1_COLUMN : A1_COLUMN + 3] = -u[..., 0, :]
-    slopes[..., 5, A3_COLUMN : A3_COLUMN + 3] = -u[..., 3, :]
-    for leg, row in enumerate(LENGTH_ROWS):
-        end = B_COLUMN + 3 * leg
-        slopes[..., row, end : end + 3] = ends[..., leg, :]
-        if row not in STRUT_ROWS:
-            continue
-        # The place along the guide, and the distance from it.
-        place, (y, z) = row - 1, (u[..., leg, axis] for axis in (1, 2))
-        slopes[..., place, GUIDE_COLUMN] = -1.0
-        slopes[..., place, TILT_COLUMN] = -z * c.joints[..., row]
-        slopes[..., place, TILT_COLUMN + 1] = y * c.joints[..., row]
-        slopes[..., place, end : end + 3] = r[..., 0, :]
-        slopes[..., row, GUIDE_COLUMN + 1 : GUIDE_COLUMN + 3] = -u[..., leg, 1:]
-        slopes[..., row, TILT_COLUMN] = z * c.joints[..., place]
-        slopes[..., row, TILT_COLUMN + 1] = -y * c.joints[..., place]
-    regular = np.isfinite(twists[..., :1, :1])
-    return np.where(regular, np.where(regular, -twists, 0.0) @ slopes, np.inf)
+    rows, b = c.jacobian[..., :3], c.points
+    # Slopes of the joints, whose rows of J are along their legs or the guide.
+    slopes = np.zeros((*c.batch, 6, len(DIMENSIONS)))
+    slopes[..., 0, A1], slopes[..., 5, A3] = -rows[..., 0, :], -rows[..., 5, :]
+    for joint, point in enumerate((0, 1, 1, 2, 2, 3)):
+        end = PLATFORM.start + 3 * point
+        slopes[..., joint, end : end + 3] = rotate(
+            np.swapaxes(c.rotation, -1, -2), rows[..., joint, :]
+        )
+    for strut, (first, end) in enumerate(((1, b.b2), (3, b.b3))):
+        pair = slice(first, first + 2)
+        slopes[..., pair, GUIDE] = -rows[..., pair, :]
+        slopes[..., pair, TILT] = np.cross(rows[..., pair, :], end[..., None, :])[..., 1:]
+        slopes[..., first, STRUTS.start + strut] = -c.leg_lengths[..., 1 + strut]
+    singular = np.isinf(twists[..., :1, :1])
+    return np.where(singular, np.inf, -np.where(singular, 0.0, twists) @ slopes)
 
 
 def actuator_errors(design: Design) -> FloatArray:
@@ -141,10 +131,10 @@ def actuator_errors(design: Design) -> FloatArray:
 
 
 SOURCES = (*JOINTS, *DIMENSIONS)
-"""The 29 sources of errors, in the order of every array axis of 29."""
+"""The 31 sources of errors, in the order of every array axis of 31."""
 
 IS_TILT = np.array(["tilt" in name for name in SOURCES])
-"""Whether each source is a tilt of the guide, shape (29,)."""
+"""Whether each source is a tilt of the guide or a strut, shape (31,)."""
 
 UNITS = tuple("degrees" if is_tilt else "mm" for is_tilt in IS_TILT.tolist())
 """Units of the errors of the sources on a drawing."""
@@ -170,27 +160,31 @@ class LargestError(NamedTuple):
 
 
 def stated_tolerances(design: Design) -> FloatArray:
-    """Return the errors of a design's actuators and its tolerances, shape (29,), as in `UNITS`."""
+    """Return the errors of a design's actuators and its tolerances, shape (31,), as in `UNITS`."""
     return np.array([*design.actuators.error_mm, *design.tolerances.stated])
 
 
-def source_errors(design: Design) -> FloatArray:
-    """Return the largest errors of the sources of a design, shape (29,), in the order of `SOURCES`.
+def source_errors(design: Design, stated: ArrayLike | None = None) -> FloatArray:
+    """Return the largest errors of the sources, shape (31,), in design units and radians.
 
-    Lengths are in design units, tilts of the guide in radians.
+    They are stated as in `UNITS`; None for those of the design.
+
+    Raises:
+        InputError: They are not 31 finite numbers, or one is negative.
     """
-    stated = stated_tolerances(design)
-    return np.where(IS_TILT, np.radians(stated), stated / design.unit_mm)
+    given = stated_tolerances(design) if stated is None else stated
+    errors = finite_array("tolerances", given, (len(SOURCES),), signed=False)
+    return np.where(IS_TILT, np.radians(errors), errors / design.unit_mm)
 
 
 def drawing_values(design: Design, errors: FloatArray) -> FloatArray:
-    """Return errors in design units and radians, shape (29,), in the units of `UNITS`."""
+    """Return errors in design units and radians, shape (31,), in the units of `UNITS`."""
     return np.where(IS_TILT, np.degrees(errors), errors * design.unit_mm)
 
 
 @computed_once
 def error_by_source(configuration: Configuration) -> FloatArray:
-    """Return the tool's error per error of each source, J⁻¹ and −J⁻¹ ∂q/∂g, shape (..., 6, 29).
+    """Return the tool's error per error of each source, J⁻¹ and −J⁻¹ ∂q/∂g, shape (..., 6, 31).
 
     Rows are the displacement and the turn of the tool, base axes; columns have the order of
     `SOURCES`. All entries are infinite in a singular pose.

@@ -31,7 +31,8 @@ from explorer.statics.accuracy import IS_TILT, SOURCES
 PARTS: tuple[str, ...] = (
     *("cylinder 1, rod 1", "carriage 2", "cylinder 2, rod 2"),
     *("carriage 3", "cylinder 3, rod 3", "cylinder 4, rod 4"),
-    *("platform" if name.startswith("b") else "base" for name in DIMENSIONS),
+    *("platform" if name.startswith("b") else "base" for name in DIMENSIONS[:-2]),
+    *("carriage 2", "carriage 3"),
 )
 """Parts of the prototype that carry each source, in the order of `SOURCES`."""
 
@@ -40,7 +41,7 @@ PARTS: tuple[str, ...] = (
 class SourceCosts:
     """The loss of precision by errors of the sources, at worst over positions.
 
-    Arrays of shape (29,) have the order of `SOURCES`. Errors are in mm, and in degrees for a tilt.
+    Arrays of shape (31,) have the order of `SOURCES`. Errors are in mm, and in degrees for a tilt.
 
     Attributes:
         displacement, turn: Largest displacement (mm) and turn (degrees) of the tool per error.
@@ -69,17 +70,17 @@ class SourceCosts:
 
     @property
     def displacement_within(self) -> FloatArray:
-        """Largest displacement by each source alone within its tolerance, shape (29,), in mm."""
+        """Largest displacement by each source alone within its tolerance, shape (31,), in mm."""
         return self.displacement * _finite(self.tolerances)
 
     @property
     def turn_within(self) -> FloatArray:
-        """Largest turn by each source alone within its tolerance, shape (29,), in degrees."""
+        """Largest turn by each source alone within its tolerance, shape (31,), in degrees."""
         return self.turn * _finite(self.tolerances)
 
     @property
     def ranking(self) -> IntArray:
-        """Sources from the costliest, shape (29,): at its tolerance, then by counted length."""
+        """Sources from the costliest, shape (31,): at its tolerance, then by counted length."""
         return np.lexsort([-self.displacement / self.lengths, -self.displacement_within])
 
 
@@ -95,7 +96,7 @@ def source_costs(configuration: Configuration) -> SourceCosts:
 def costs_of(
     configuration: Configuration, influences: FloatArray, tolerances: FloatArray
 ) -> SourceCosts:
-    """Return the costs, given `source_influences` of a configuration and tolerances (29,)."""
+    """Return the costs, given `source_influences` of a configuration and tolerances (31,)."""
     bounds = _finite(tolerances)
     worst = accuracy.largest_error(influences, bounds)
     rms = accuracy.rms_of_sources(influences, bounds)
@@ -125,7 +126,7 @@ def costs_of(
 
 
 def source_influences(configuration: Configuration) -> FloatArray:
-    """Return displacement (mm) and turn (degrees) of the tool per error, shape (n, 6, 29).
+    """Return displacement (mm) and turn (degrees) of the tool per error, shape (n, 6, 31).
 
     Raises:
         InputError: There is no position.
@@ -153,18 +154,21 @@ def source_influences(configuration: Configuration) -> FloatArray:
 
 
 def error_lengths(design: Design) -> FloatArray:
-    """Return the length that counts for a unit of error of each source, shape (29,), in mm.
+    """Return the length that counts for a unit of error of each source, shape (31,), in mm.
 
-    A length counts as itself. A tilt counts as what it moves the far end of the guide: the carriage
-    position of the larger magnitude that the limits of the guide allow, or, without these, a
-    point at the distance of the reach.
+    A length counts as itself. A tilt counts as what it moves the far end of its part. That of the
+    guide is the carriage position of the larger magnitude that its limits allow, or, without
+    these, a point at the distance of the reach; that of a strut is its largest length.
     """
     far = max(map(abs, design.limits.guide or (0.0,))) or design.reach
-    return np.where(IS_TILT, np.radians(1.0) * far * design.unit_mm, 1.0)
+    ends = [far, far, *(design.length_range(name)[1] for name in ("d2", "d4"))]
+    lengths = np.ones(len(SOURCES))
+    lengths[IS_TILT] = np.radians(ends) * design.unit_mm
+    return lengths
 
 
 def with_tolerances(design: Design, tolerances: FloatArray) -> Design:
-    """Return a design with other errors of its actuators and tolerances, (29,), in mm and degrees.
+    """Return a design with other errors of its actuators and tolerances, (31,), in mm and degrees.
 
     Where they are infinite, so that any will do, the design keeps what it states.
     """
@@ -223,7 +227,7 @@ def _solve_cuts(costs: FloatArray, cuts: list[FloatArray]) -> tuple[FloatArray, 
 NO_INFLUENCE = 1e-12
 # Largest excess of the effort over its lower bound, as a share, and the most rounds.
 GAP, MOST_ROUNDS = 1e-6, 100
-# Room for the rounding of a sum of 29 errors, as a share of what is wanted.
+# Room for the rounding of a sum of 31 errors, as a share of what is wanted.
 ROOM = 1e-9
 
 
@@ -232,7 +236,7 @@ class ToleranceBudget:
     """Tolerances that keep a wanted precision, with the least effort.
 
     Attributes:
-        tolerances: Tolerances of the sources in the order of `SOURCES`, shape (29,), in mm and
+        tolerances: Tolerances of the sources in the order of `SOURCES`, shape (31,), in mm and
             degrees, rounded down to two significant digits; those kept are as stated, and those of
             sources that move nothing are infinite.
         costs: What these tolerances cost in precision.
@@ -296,10 +300,10 @@ def tolerance_budget(
 def _allocate(
     shares: FloatArray, lengths: FloatArray, kept_errors: FloatArray, is_free: BoolArray
 ) -> tuple[FloatArray, float]:
-    """Return the tolerances of least effort, shape (29,), and a lower bound of the effort.
+    """Return the tolerances of least effort, shape (31,), and a lower bound of the effort.
 
-    Shares (n, 6, 29) are displacement and turn per error, over what is wanted. Lengths (29,) count
-    for a unit of error. Kept errors (29,) have a worst error below 1.
+    Shares (n, 6, 31) are displacement and turn per error, over what is wanted. Lengths (31,) count
+    for a unit of error. Kept errors (31,) have a worst error below 1.
     """
     halves = shares.reshape(-1, 2, 3, len(SOURCES))
     largest = np.sqrt((halves**2).sum(axis=2)).max(axis=(0, 1))

@@ -167,7 +167,7 @@ class LoadedPose(Configuration):
         return WorstForce(direction, part, share)
 
 
-BY_ACTUATORS, BY_DIMENSIONS, BY_ALL = slice(0, 6), slice(6, 29), slice(0, 29)
+BY_ACTUATORS, BY_DIMENSIONS, BY_ALL = slice(0, 6), slice(6, 31), slice(0, 31)
 """The sources of errors that are actuators, those that are dimensions, and all of them."""
 
 GROUPS = {"actuators": BY_ACTUATORS, "dimensions": BY_DIMENSIONS, "all": BY_ALL}
@@ -216,12 +216,12 @@ class ToolPrecision:
 
     @cached_property
     def bounds(self) -> FloatArray:
-        """Largest errors of the sources, shape (29,), in design units and radians."""
+        """Largest errors of the sources, shape (31,), in design units and radians."""
         return accuracy.source_errors(self.loaded.design)
 
     @cached_property
     def by_source(self) -> FloatArray:
-        """The tool's error per error of each source, shape (6, 29)."""
+        """The tool's error per error of each source, shape (6, 31)."""
         return accuracy.error_by_source(self.loaded)
 
     def worst(self, sources: slice = BY_ALL) -> accuracy.LargestError:
@@ -234,7 +234,7 @@ class ToolPrecision:
 
     @cached_property
     def alone(self) -> accuracy.ToolError:
-        """The errors that each source alone causes, each of shape (29,)."""
+        """The errors that each source alone causes, each of shape (31,)."""
         return accuracy.errors_alone(self.by_source, self.bounds)
 
     @cached_property

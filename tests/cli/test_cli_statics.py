@@ -147,7 +147,7 @@ def test_accuracy_json_has_errors_compliance_and_deflection(cli: CommandLine) ->
         found["pose_error_by_geometry"], explorer.pose_error_by_geometry(MACHINE, *AT), atol=1e-12
     )
     assert sum(found["deflection_shares"].values()) == pytest.approx(1.0)
-    assert len(found["dimensions"]) == len(found["displacement_by_geometry"]) == 23
+    assert len(found["dimensions"]) == len(found["displacement_by_geometry"]) == 25
 
 
 def test_accuracy_options_replace_those_of_the_design(cli: CommandLine) -> None:
@@ -195,8 +195,8 @@ def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine) -> No
     text = cli.text("budget", "--design", STATED, *OVER_BOX)
     assert "worst over 729 nodes of a grid over the box" in text
     rows = [line for line in text.splitlines() if line.split(" ")[0] in SOURCES]
-    rows += [line for line in text.splitlines() if line.startswith("guide ")]
-    assert len(rows) == 29
+    rows += [line for line in text.splitlines() if line.startswith(("guide ", "strut "))]
+    assert len(rows) == 31
     assert "found" not in text
 
 
@@ -253,7 +253,7 @@ def test_accuracy_has_totals_of_dimensions_and_of_all_sources(cli: CommandLine) 
     found = cli.answer("accuracy", "--design", STATED)
     by_source = error_by_source(explorer.Configuration(STATED, HOME.position, HOME.rotation))
     bounds = source_errors(STATED)
-    for name, sources in (("dimensions", slice(6, 29)), ("all", slice(0, 29))):
+    for name, sources in (("dimensions", slice(6, 31)), ("all", slice(0, 31))):
         worst = largest_error(by_source[:, sources], bounds[sources])
         rms = rms_of_sources(by_source[:, sources], bounds[sources])
         for kind in ("displacement", "turn"):

@@ -81,7 +81,7 @@ def test_costs_are_those_of_the_worst_position_in_mm_and_degrees() -> None:
     assert_allclose(costs.shares * costs.worst_displacement, part, rtol=1e-9)
     ranked = costs.displacement_within[costs.ranking]
     assert (np.diff(ranked) <= 0.0).all()
-    assert sorted(costs.ranking) == list(range(29))
+    assert sorted(costs.ranking) == list(range(31))
     ideal = source_costs(Configuration(OPTIMAL, positions, HOME.rotation, TOOL))
     assert (ideal.worst_displacement, ideal.worst_turn, ideal.rms_turn) == (0.0, 0.0, 0.0)
     assert not ideal.shares.any()
@@ -110,7 +110,7 @@ def test_found_tolerances_keep_what_is_wanted_for_all_errors(
     # What is wanted is used up but for the rounding to two digits.
     assert max(displacement / 0.05, turn / (wanted_turn or np.inf)) > 0.9
     assert found.costs.worst_displacement == pytest.approx(float(displacement))
-    signs = np.sign(np.random.default_rng(5).normal(size=(500, 29)))
+    signs = np.sign(np.random.default_rng(5).normal(size=(500, 31)))
     moved = np.einsum("nij,cj->nci", by_source, signs * bounds)
     assert 10.0 * np.linalg.norm(moved[..., :3], axis=-1).max() <= 0.05
     assert found.effort >= found.least_effort > 0.0
@@ -187,7 +187,7 @@ def test_no_other_tolerances_over_the_box_take_less_effort() -> None:
     lengths, rng = error_lengths(OPTIMAL), np.random.default_rng(1)
     least: list[float] = []
     for size in np.repeat([1e-4, 1e-3, 1e-2, 0.1, 1.0], 4):
-        tried = found.tolerances * np.exp(size * rng.normal(size=29))
+        tried = found.tolerances * np.exp(size * rng.normal(size=31))
         worst = largest_error(shares, tried)
         tried /= max(worst.displacement.max(), worst.turn.max())
         least.append(float((1.0 / (tried * lengths)).sum()))

@@ -228,7 +228,7 @@ WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in
 class BudgetCommand(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     """Rank what tolerances cost in precision; find those of a wanted precision.
 
-    The sources of errors are the six actuators and the 23 dimensions. The worst error is exact for
+    The sources of errors are the six actuators and the 25 dimensions. The worst error is exact for
     the linear model, over all combinations of signs, at the worst of the positions; the RMS error
     is that of independent errors, each uniform within its bounds. The tolerances that are found
     have the least sum of their reciprocals.

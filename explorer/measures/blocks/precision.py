@@ -199,7 +199,7 @@ def tolerance_budget(
         yield block.Statement(
             "",
             "The design states no tolerances; the displacements are those by an error of 1 mm, and "
-            "by a tilt that moves the guide's end by 1 mm.",
+            "by a tilt that moves its part's end by 1 mm.",
         )
     if found is not None:
         above = block.Number(100.0 * found.excess, " %", 2)
@@ -254,6 +254,6 @@ def _costs(costs: SourceCosts, *, per_unit: bool) -> block.Table:
             block.Column("turn", costs.turn_within[ranking].tolist(), "°", wide=True),
             block.Column("share", (100.0 * costs.shares[ranking]).tolist(), " %", wide=True),
         ),
-        "Errors of the six actuators and the 23 dimensions. A tilt counts as what it moves the "
-        "guide's end by.",
+        "Errors of the six actuators and the 25 dimensions. A tilt counts as what it moves its "
+        "part's end by.",
     )  # fmt: skip

@@ -98,7 +98,7 @@ class PrecisionPanel:
         with gui.add_folder("Budget of tolerances"):
             controls.checkbox(
                 "What each tolerance costs",
-                "Rank the six actuators and the 23 dimensions by what their errors cost at the "
+                "Rank the six actuators and the 25 dimensions by what their errors cost at the "
                 "tool.",
                 "view.precision.budget",
             )
