@@ -29,6 +29,7 @@ RINGS = {
         "paths",
         "optimise",
         "find",
+        "calibration",
         "prototype",
         "numerics",
     ),

@@ -35,6 +35,7 @@ ROOMS = (
     "paths",
     "optimise",
     "find",
+    "calibration",
     "sweep",
     "reproduce",
     "export",

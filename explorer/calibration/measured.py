@@ -1,0 +1,132 @@
+"""What is measured of a machine in its poses, and how it depends on them and on the setup.
+
+Lengths are in design units and angles in radians, standard deviations too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from explorer.errors import InputError
+from explorer.numerics.arrays import FloatArray, IntArray, dot, finite_array, lengths_of
+
+Kind = Literal["poses", "targets", "bar", "gauge"]
+"""What is measured: whole poses, positions of points of the platform, distances of one from a ball
+of the base, or distances of one from planes."""
+
+STEP = 1e-6
+"""Difference by which slopes are taken, in radians and design units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What was measured in n poses, and the setup as far as it is known.
+
+    Unknowns count from what is stated here: of points, then of the frame, the ball or the planes.
+
+    Attributes:
+        kind: What is measured.
+        values: Values, shape (n, m), NaN where there is none: position and rotation vector of the
+            platform's frame, the positions of all points, or one distance.
+        sigma: Standard deviations of their errors, of a shape that broadcasts to (n, m).
+        points: Measured points in the platform frame, shape (s, 3); the origin for whole poses.
+        points_known: Whether they are there exactly, as is the origin.
+        in_base: Whether poses and targets are in the base frame, rather than in another fixed one.
+        base: Ball of the base, shape (1, 3), or planes, shape (p, 4): normals, and distances of
+            the planes from the origin.
+        plane: Planes of the poses, shape (n,), in turn if there are fewer.
+
+    Raises:
+        InputError: Values are not rows of numbers, or a deviation is not positive.
+    """
+
+    kind: Kind
+    values: FloatArray
+    sigma: FloatArray
+    points: FloatArray = field(default_factory=lambda: np.zeros((1, 3)))
+    points_known: bool = False
+    in_base: bool = True
+    base: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    plane: IntArray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        if self.values.ndim != 2 or np.isinf(self.values).any():
+            raise InputError("measured values must be finite or NaN, one row for each pose")
+        if (finite_array("sigma", self.sigma, ()) <= 0.0).any():
+            raise InputError(f"sigma must be positive; got {np.min(self.sigma):g}")
+
+    @property
+    def shifts(self) -> int:
+        """Number of unknowns of the points."""
+        return 0 if self.points_known or self.kind == "poses" else self.points.size
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns of the setup."""
+        return self.shifts + 3 * len(self.base) + (0 if self.in_base else 6)
+
+    def model(self, position: FloatArray, rotation: FloatArray, unknowns: FloatArray) -> FloatArray:
+        """Return the values in poses (n, 3) and (n, 3, 3), given unknowns (k,), shape (n, m)."""
+        shifts, off = np.zeros(self.points.size), unknowns[self.shifts :]
+        shifts[: self.shifts] = unknowns[: self.shifts]
+        places = self.points + shifts.reshape(-1, 3)
+        points = position[:, None] + places @ np.swapaxes(rotation, 1, 2)
+        if self.kind == "bar":
+            return lengths_of(points - self.base - off)
+        if self.kind == "gauge":
+            # Of a plane, two tilts and the distance are unknown.
+            off, normals = off.reshape(-1, 1, 3), self.base[:, None, :3]
+            normals = normals + off[..., :2] @ np.linalg.svd(normals)[2][:, 1:]
+            normals, distances = (
+                normals / lengths_of(normals)[..., None],
+                off[..., 2] + self.base[:, 3:],
+            )
+            plane = np.resize(self.plane, len(points))
+            return dot(points, normals[plane]) - distances[plane]
+        turn = np.eye(3) if self.in_base else Rotation.from_rotvec(off[:3]).as_matrix()
+        values = (points @ turn.T + (0.0 if self.in_base else off[3:])).reshape(len(points), -1)
+        if self.kind == "targets":
+            return values
+        return np.concatenate([values, Rotation.from_matrix(turn @ rotation).as_rotvec()], axis=1)
+
+    def slopes(
+        self, position: FloatArray, rotation: FloatArray, unknowns: FloatArray
+    ) -> FloatArray:
+        """Return slopes of the model by the twist (v; ω) of the platform's frame and the unknowns.
+
+        They are differences, shape (n, m, 6 + k).
+        """
+        here, columns = self.model(position, rotation, unknowns), list[FloatArray]()
+        for off in STEP * np.eye(6 + len(unknowns)):
+            turned = Rotation.from_rotvec(off[3:6]).as_matrix() @ rotation
+            there = self.model(position + off[:3], turned, unknowns + off[6:])
+            columns.append(self.differences(there, here) / STEP)
+        return np.stack(columns, axis=-1)
+
+    def differences(self, values: FloatArray, others: FloatArray) -> FloatArray:
+        """Return values less others, each (n, m), turns from one to the other as such."""
+        off = values - others
+        if self.kind == "poses":
+            turns = np.nan_to_num(values[:, 3:]), np.nan_to_num(others[:, 3:])
+            there, here = map(Rotation.from_rotvec, turns)
+            off[:, 3:] = np.where(np.isnan(off[:, 3:]), np.nan, (there * here.inv()).as_rotvec())
+        return off
+
+    def align(self, position: FloatArray, rotation: FloatArray) -> Measured:
+        """Return values in the frame that fits best if the base's are of these poses."""
+        if self.in_base:
+            return self
+        there = self.values[:, : self.points.size].reshape(-1, 3)
+        here = (position[:, None] + self.points @ np.swapaxes(rotation, 1, 2)).reshape(-1, 3)
+        known = np.isfinite(there + here).all(axis=1)
+        middles = there[known].mean(axis=0), here[known].mean(axis=0)
+        turn = Rotation.align_vectors(here[known] - middles[1], there[known] - middles[0])[0]
+        values = (turn.apply(there - middles[0]) + middles[1]).reshape(len(position), -1)
+        if self.kind == "poses":
+            vectors = (turn * Rotation.from_rotvec(np.nan_to_num(self.values[:, 3:]))).as_rotvec()
+            values = np.concatenate([values, vectors + 0.0 * self.values[:, 3:]], axis=1)
+        return replace(self, values=values)
