@@ -5,13 +5,14 @@ within the tolerances: what is unseen stays nominal, and what has no tolerance i
 Gauss and Newton take poses from the forward kinematics of the present machine, and slopes from the
 linear model of `explorer.statics.accuracy`. A Cauchy loss finds the lines that are wrong (Holland
 and Welsch, Robust Regression Using Iteratively Reweighted Least-Squares, 1977); least squares of
-the others are as exact as the Cramér–Rao bound allows.
+the others are as exact as the Cramér–Rao bound allows. A machine is kept only if it tells lines
+better that were held out than the design does.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -26,8 +27,9 @@ from explorer.mechanism.built_machine import COUNT, BuiltMachine
 from explorer.mechanism.configuration import Configuration, tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import joint_array
-from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.statics.accuracy import UNIFORM, error_by_source, source_errors
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.search import one_thread
+from explorer.statics.accuracy import SOURCES, UNIFORM, error_by_source, source_errors
 
 Loss = Literal["cauchy", "linear"]
 Weighting = Literal["cauchy", "linear", "trimmed"]
@@ -40,8 +42,9 @@ ROUGH, SETTLED, MOST_STEPS = 1e-2, 1e-10, 60
 """Steps, as shares of the tolerances' standard deviations, at which the search for wrong lines and
 the last one end, and the most of them."""
 
-CHECKED = 200
-"""Number of poses over which the errors of the tool are told."""
+CHECKED, FOLDS, MOST_EXCESS = 200, 5, 3.0
+"""Number of poses over which the errors of the tool are told, number of parts of the lines of which
+each is held out once, and largest excess of the sum of squares that is no fault."""
 
 # Share of the largest singular value, and size of a step, up to which they may be rounding.
 LOST, ROUNDING = 1e-8, 1e-5
@@ -52,7 +55,7 @@ class Calibration:
     """A machine that was identified.
 
     Attributes:
-        machine: The design with its most likely deviations.
+        machine: The design with its most likely deviations; with none if that gains nothing.
         covariance: Their covariance, shape (31, 31), in design units and radians.
         unknowns: Unknowns of the setup, shape (k,).
         seen: Number of independent combinations of deviations that the measurement shows.
@@ -63,6 +66,8 @@ class Calibration:
         degrees: Its expectation.
         tool_before, tool_after: Root mean square errors of the tool over other poses, by the design
             and by the machine, but for the frames of the measurement, in design units.
+        held_out: Root mean squares of the residuals of lines that were held out, in standard
+            deviations, by the design and by machines of the other lines, shape (2,).
     """
 
     machine: BuiltMachine
@@ -76,11 +81,36 @@ class Calibration:
     degrees: int
     tool_before: float
     tool_after: float
+    held_out: FloatArray
 
     @property
     def excess(self) -> float:
         """Sum of squares above its expectation, over its standard deviation."""
         return (self.chi_square - self.degrees) / math.sqrt(2.0 * max(1, self.degrees))
+
+    @property
+    def worst(self) -> list[int]:
+        """The three lines of the largest residuals, from 0."""
+        return np.argsort(-np.nansum(self.residuals**2, axis=1))[:3].tolist()
+
+    @property
+    def gains(self) -> bool:
+        """Whether the machine tells lines that were held out better than the design does."""
+        return bool(self.held_out[1] < self.held_out[0])
+
+    @property
+    def faults(self) -> list[str]:
+        """What is wrong with the measurement, as sentences; none if the machine may be used."""
+        few = ", ".join(name for name in self.unseen if name in SOURCES)
+        worst = ", ".join(str(1 + k) for k in sorted(self.worst))
+        words = {
+            "nothing gained: the design tells lines better that are held out": not self.gains,
+            f"too few poses, or too coarse, to see {few}": few,
+            f"χ² is {self.excess:.1f}σ above its expectation, most at lines {worst}": (
+                self.excess > MOST_EXCESS
+            ),
+        }
+        return [each for each, holds in words.items() if holds]
 
 
 def calibrate(
@@ -140,12 +170,14 @@ def calibrate(
     poses = sample_poses(design, CHECKED, tolerances, seed=1).with_tool(design.tool.position)
     tool = error_by_source(poses)[:, :3] * spread @ (np.eye(COUNT) - frames @ frames.T)
     machine, squares = BuiltMachine(design, state[:COUNT] * spread), residuals[used] ** 2
+    held_out = problem.held_out(state, used)
+    gains = held_out[1] < held_out[0]
     reached = machine.forward(poses.joints)
     before = (
         reached.position - poses.position + tool_offset(reached.rotation, poses.tool) - poses.arm
     )
     return Calibration(
-        machine=machine,
+        machine=machine if gains else BuiltMachine(design, np.zeros(COUNT)),
         covariance=covariance * np.outer(spread, spread),
         unknowns=state[COUNT:],
         seen=int((spread > 0.0).sum()) - len(names),
@@ -156,6 +188,7 @@ def calibrate(
         degrees=int(np.isfinite(squares).sum()) - setup.shape[1],
         tool_before=float(np.sqrt((before[reached.closes] ** 2).sum(axis=1).mean())),
         tool_after=float(np.sqrt(np.einsum("kij,jl,kil->k", tool, covariance, tool).mean())),
+        held_out=held_out,
     )
 
 
@@ -199,7 +232,8 @@ class _Problem:
             misses = np.concatenate(
                 [np.nan_to_num(root * residuals).ravel(), -drawn @ state[:COUNT]]
             )
-            step = np.linalg.lstsq(rows, misses, rcond=None)[0]
+            with one_thread():
+                step = np.linalg.lstsq(rows, misses, rcond=None)[0]
             state, size = state + step, float(np.abs(step / scale).max())
             # Steps that are small and no longer shrink are rounding.
             if size <= end or ROUNDING > size >= last:
@@ -209,6 +243,22 @@ class _Problem:
             f"no machine settles in {MOST_STEPS} steps: measure in more poses, farther from "
             "singular ones, and state the setup closer to what it is"
         )
+
+    def held_out(self, state: FloatArray, used: BoolArray) -> FloatArray:
+        """Return the root mean squares of residuals of used lines that are held out, shape (2,).
+
+        They are by the design, whose setup alone is fitted to the other lines, and by the machine.
+        """
+        part, squares = np.cumsum(used) % FOLDS, np.full((2, len(used)), np.nan)
+        for out in (used & (part == k) for k in range(min(FOLDS, int(used.sum())))):
+            values = np.where((used & ~out)[:, None], self.measured.values, np.nan)
+            rest = replace(self.measured, values=values)
+            for row, spread in zip(squares, (0.0 * self.spread, self.spread), strict=True):
+                found = replace(self, spread=spread)
+                there = replace(found, measured=rest).settle(state, "linear", SETTLED)
+                row[out] = np.nanmean(found.lines(there)[0][out] ** 2, axis=1)
+        told = np.isfinite(squares).all(axis=0)
+        return np.sqrt(squares[:, told].sum(axis=1) / max(1, int(told.sum())))
 
 
 def weights_of(residuals: FloatArray, kind: Weighting) -> FloatArray:
