@@ -90,7 +90,7 @@ class Calibration:
 
     @property
     def worst(self) -> list[int]:
-        """The three lines of the largest residuals, from 0."""
+        """The three lines of the largest residuals, from 0, the worst first."""
         return np.argsort(-np.nansum(self.residuals**2, axis=1))[:3].tolist()
 
     @property
@@ -106,7 +106,7 @@ class Calibration:
         words = {
             "nothing gained: the design tells lines better that are held out": not self.gains,
             f"too few poses, or too coarse, to see {few}": few,
-            f"χ² is {self.excess:.1f}σ above its expectation, most at lines {worst}": (
+            f"χ² is {self.excess:.1f}σ above its expectation, most in poses {worst}": (
                 self.excess > MOST_EXCESS
             ),
         }
@@ -143,7 +143,7 @@ def calibrate(
     if not spread.any():
         raise InputError(
             "no deviation has a tolerance, so that the machine is the design: give its file "
-            "tolerances or actuators.error_mm"
+            "tolerances or actuators.error_mm, or assume --typical ones"
         )
     start = BuiltMachine(design, np.zeros(COUNT)).forward(joints)
     if not start.closes.any():

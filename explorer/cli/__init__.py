@@ -36,6 +36,7 @@ COMMANDS: Mapping[str, str] = {
     "find": "Find designs that keep a requirement, each of another kind, the preferred one first.",
     "optimise": "Optimise a design by SQP: match a volume, shorten the legs, or raise the volume.",
     "sweep": "Measure the designs of a study, on every core or a cluster; list the Pareto front.",
+    "calibrate": "Identify the machine that was built, or choose the poses in which to measure it.",
     "export": "Write workspace, parts, models, pages, a figure or code for controllers as files.",
     "report": "Write a report of a design: drawings, slices, tables, and how to reproduce it.",
     "screenshot": "Draw a pose into a PNG file.",

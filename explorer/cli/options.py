@@ -30,6 +30,7 @@ from explorer.statics.reactions import has_limits
 from explorer.workspace.workspace import Workspace
 
 if TYPE_CHECKING:
+    from explorer.mechanism.built_machine import BuiltMachine
     from explorer.workspace.carried_region import CarriedRegion
 
 _Struct = TypeVar("_Struct", bound=msgspec.Struct)
@@ -135,6 +136,20 @@ class TypicalOptions:
     def with_typical(self, design: Design) -> tuple[Design, tuple[str, ...]]:
         """Return the design with what is assumed of it, and in words what that is."""
         return typical_machine(design) if self.typical else (design, ())
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachineOptions:
+    """The option for the machine that was built."""
+
+    machine: Annotated[Path | None, values.hint("default: the design itself", "FILE.json")] = None
+    """Machine that was built of the design, as `explorer calibrate` writes it."""
+
+    def read_machine(self, design: Design) -> BuiltMachine | None:
+        """Return the machine that was built of a design, None for the design itself."""
+        from explorer.calibration.machine_file import load_machine
+
+        return None if self.machine is None else load_machine(self.machine, design)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -218,6 +218,15 @@ PoseNumbers = Annotated[
         "a position x y z, and may go on with yaw pitch roll or with a quaternion w x y z",
     ),
 ]
+_PLANE = "nx ny nz distance"
+Planes = Annotated[
+    Numbers | None,
+    _numbers_in_orders(
+        (_PLANE, *(" ".join([_PLANE] * k) for k in (2, 3))),
+        "NX NY NZ DISTANCE [...]",
+        "1 to 3 planes, each by its normal and its distance from a1",
+    ),
+]
 LOAD = _numbers_in_orders(
     ("fx fy fz", "fx fy fz mx my mz"),
     "FX FY FZ [MX MY MZ]",

@@ -49,6 +49,9 @@ NO_POSE = "the lengths do not close"
 POSITION, TOOL = ("x", "y", "z"), ("tool_x", "tool_y", "tool_z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 YAW_PITCH_ROLL, TILT_TORSION = ("yaw", "pitch", "roll"), ("azimuth", "tilt", "torsion")
+TARGETS = tuple(f"t{k}_{axis}" for k in (1, 2, 3) for axis in "xyz")
+DISTANCES, SIGMA = ("bar", "gauge"), "sigma"
+"""The columns of what is measured, besides positions and orientations."""
 _ROTATIONS: dict[tuple[str, ...], Callable[[ArrayLike], FloatArray]] = {
     QUATERNION: rotation_from_quaternion,
     YAW_PITCH_ROLL: rotation_from_yaw_pitch_roll,
@@ -60,7 +63,7 @@ _LENGTH = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 _RADIAN = math.degrees(1.0)
 _ANGLE = {"deg": 1.0, "°": 1.0, "degrees": 1.0, "rad": _RADIAN, "radians": _RADIAN}
 _UNITS: dict[str, Mapping[str, float]] = {
-    **dict.fromkeys((*JOINTS, *POSITION, *TOOL), _LENGTH),
+    **dict.fromkeys((*JOINTS, *POSITION, *TOOL, *TARGETS, *DISTANCES, SIGMA), _LENGTH),
     **dict.fromkeys((*YAW_PITCH_ROLL, *TILT_TORSION), _ANGLE),
     **{name: {} for name in QUATERNION},
     "time": {"s": 1.0},
@@ -288,20 +291,36 @@ class TableAnswer(NamedTuple):
     skipped: tuple[str, ...]
 
 
-def inverse_answer(table: PoseTable, poses: Configuration, at: Point = "b4") -> TableAnswer:
-    """Return the joints of the poses of a table, and which limits each violates."""
-    rows, closes = np.arange(len(table.rows)), np.ones(len(table.rows), np.bool_)
-    return _answer(table, (rows, mode_of(poses.margins)), poses, poses.joints, closes, at)
+def inverse_answer(
+    table: PoseTable,
+    poses: Configuration,
+    at: Point = "b4",
+    joints: FloatArray | None = None,
+    closes: BoolArray | None = None,
+) -> TableAnswer:
+    """Return the joints of the poses of a table, and which limits each violates.
+
+    Other joints (n, 6) than those of the design may be given, and which of the poses close, (n,).
+    """
+    rows = np.arange(len(table.rows))
+    closes = np.ones(len(rows), np.bool_) if closes is None else closes
+    joints = poses.joints if joints is None else joints
+    return _answer(table, (rows, mode_of(poses.margins)), poses, joints, closes, at)
 
 
 def forward_answer(
-    table: PoseTable, design: Design, joints: FloatArray, at: Point = "b4"
+    table: PoseTable,
+    design: Design,
+    joints: FloatArray,
+    at: Point = "b4",
+    modes: kinematics.ForwardKinematics | None = None,
 ) -> TableAnswer:
     """Return the eight modes of the joints (n, 6) of a table, and which limits each violates.
 
-    Joints that do not close have one line without a mode.
+    Joints that do not close have one line without a mode. Other modes than those of the design may
+    be given.
     """
-    modes = kinematics.forward(design, joints)
+    modes = modes or kinematics.forward(design, joints)
     given, mode = np.nonzero(modes.feasible[:, None] | (np.arange(8) == 0))
     poses = Configuration(design, modes.position[given, mode], modes.rotation[given, mode])
     return _answer(table, (given, mode), poses, joints, modes.feasible, at)

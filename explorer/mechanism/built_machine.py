@@ -23,10 +23,11 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, STRUT_ROWS, Design
-from explorer.mechanism.kinematics import joint_array
+from explorer.mechanism.kinematics import ForwardKinematics, joint_array
 from explorer.mechanism.machine import A1, A3, DIMENSIONS, GUIDE, PLATFORM, STRUTS, TILT
+from explorer.mechanism.margins import margins, signs_of
 from explorer.mechanism.pose import pose_rows
-from explorer.numerics.arrays import BoolArray, FloatArray, finite_array, lengths_of
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, finite_array, lengths_of
 
 COUNT = len(JOINTS) + len(DIMENSIONS)
 """Number of deviations: six zeros of the encoders, then one for each dimension."""
@@ -146,27 +147,50 @@ class BuiltMachine:
         joints[:, GUIDE_ROWS] = ends[:, 1:3, 0] - radii * np.tan(self.strut_tilts)
         return joints - self.encoder_offsets
 
-    def forward(self, joints: ArrayLike, signs: tuple[int, int, int] | None = None) -> BuiltPose:
+    def forward(self, joints: ArrayLike, signs: ArrayLike | None = None) -> BuiltPose:
         """Return the poses in which the encoders read joints (..., 6), in design units.
 
-        They are those of one assembly mode, by its sign triple; None for the one of home.
+        They are those of assembly modes, by sign triples (..., 3); None for the one of home.
 
         Raises:
             InputError: The joints are not usable.
         """
-        asked = joint_array(joints)
-        batch, rows, reach = asked.shape[:-1], asked.reshape(-1, 6), self.design.reach
+        asked, triples = (
+            joint_array(joints),
+            np.asarray(self.design.home_signs if signs is None else signs),
+        )
+        batch, reach = np.broadcast_shapes(asked.shape[:-1], triples.shape[:-1]), self.design.reach
+        rows = np.broadcast_to(asked, (*batch, 6)).reshape(-1, 6)
+        triples = np.broadcast_to(triples, (*batch, 3)).reshape(-1, 3)
         with np.errstate(invalid="ignore", divide="ignore"):
-            p, r = self._solve(rows + self.encoder_offsets, signs or self.design.home_signs)
+            p, r = self._solve(rows + self.encoder_offsets, triples.T)
             off = np.abs(self._readings(p, r) - rows).max(axis=1)
         closes = np.asarray(off <= CLOSED * np.maximum(reach, np.abs(rows).max(axis=1)))
         p, r = np.where(closes[:, None], p, 0.0), np.where(closes[:, None, None], r, np.eye(3))
         return BuiltPose(p.reshape(*batch, 3), r.reshape(*batch, 3, 3), closes.reshape(batch))
 
-    def _solve(
-        self, joints: FloatArray, signs: tuple[int, int, int]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return positions (n, 3) and rotations (n, 3, 3) of true joints (n, 6)."""
+    def modes(self, joints: ArrayLike) -> ForwardKinematics:
+        """Return the poses of all eight modes; joints close only if all modes do.
+
+        Arguments and errors are those of `forward`.
+        """
+        found = self.forward(joint_array(joints)[..., None, :], [*map(signs_of, range(8))])
+        return ForwardKinematics(
+            found.position, found.rotation, np.asarray(found.closes.all(axis=-1))
+        )
+
+    def commands(self, position: ArrayLike, rotation: ArrayLike) -> BuiltPose:
+        """Return the poses to command a controller that knows the design alone, for true ones.
+
+        Each closes if the design has a pose of the same joints in the same mode. Arguments and
+        errors are those of `inverse`.
+        """
+        signs, known = np.where(margins(position, rotation) > 0.0, 1, -1), np.zeros(COUNT)
+        joints = self.inverse(position, rotation)
+        return BuiltMachine(self.design, known).forward(joints, signs)
+
+    def _solve(self, joints: FloatArray, signs: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions and rotations, (n, 3) and (n, 3, 3), by true joints and signs (3, n)."""
         (a1, a3), (axes, (b1, b4)), tilts = self.bases, self.platform, self.strut_tilts
         on_x, to_a3, to_b1 = np.sign([self.design.b3 - self.design.b2, a3[1], b1[1]])
         l1, l4, lengths = joints[:, 0], joints[:, 5], joints[:, STRUT_ROWS]
@@ -203,7 +227,7 @@ class BuiltMachine:
 
 
 def _turn_between(
-    point: FloatArray, fixed: FloatArray, length: FloatArray, side: float
+    point: FloatArray, fixed: FloatArray, length: FloatArray, side: FloatArray
 ) -> FloatArray:
     """Return the turn about x of a point that brings it to a side of a fixed one, a length away."""
     one, other = (np.hypot(each[..., 1], each[..., 2]) for each in (point, fixed))

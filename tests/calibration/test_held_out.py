@@ -70,4 +70,4 @@ def test_few_poses_and_sums_of_squares_are_faults_with_their_names() -> None:
     assert found.excess > 3.0
     assert 7 in found.worst
     assert " 8" in words
-    assert words.startswith(f"χ² is {found.excess:.1f}σ above its expectation, most at lines ")
+    assert words.startswith(f"χ² is {found.excess:.1f}σ above its expectation, most in poses ")

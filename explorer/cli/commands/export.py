@@ -46,7 +46,9 @@ COMMON = ("what", "out", "format", "design", "json")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportCommand(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
+class ExportCommand(
+    options.JsonOptions, options.TypicalOptions, options.MachineOptions, options.PoseOptions
+):
     """Write workspace, parts, models, pages, a figure or code for controllers as files.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
@@ -244,7 +246,11 @@ def _simulation(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]
     masses = make_prototype(design).masses(density) if command.masses == "parts" else None
     given: Design | ImperfectMachine = design
     facts: Facts = {}
-    if command.errors is not None:
+    if (machine := command.read_machine(design)) is not None:
+        if command.errors is not None:
+            raise InputError("give either --errors SEED or --machine FILE.json")
+        given = ImperfectMachine(design, machine.deviations)
+    elif command.errors is not None:
         design, assumed = command.with_typical(design)
         given = ImperfectMachine.draw(design, command.errors)
         facts = {"assumed": assumed, **_imperfect_json(given)}
@@ -316,7 +322,7 @@ _WRITERS: dict[What, tuple[Callable[[ExportCommand, str], tuple[Data, Facts]], t
     "workspace": (_mesh, ("tolerance", "load", *_ORIENTATION)),
     "hull": (_mesh, ("tolerance", "load", *_ORIENTATION)),
     "mechanism": (_mechanism, ("density",)),
-    "simulation": (_simulation, ("density", "masses", "errors", "typical")),
+    "simulation": (_simulation, ("density", "masses", "errors", "typical", "machine")),
     "scene": (_scene, _POSE),
     "page": (_page, ()),
     "figure": (_figure, (*_POSE, "view", "width", "black", "tetrahedra")),

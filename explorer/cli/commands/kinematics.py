@@ -31,14 +31,15 @@ from explorer.workspace.limits.table import joint_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
-class InverseCommand(options.JsonOptions, options.PoseOptions):
+class InverseCommand(options.JsonOptions, options.MachineOptions, options.PoseOptions):
     """Compute the joints of a pose, or of a table of poses.
 
     Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design and the legs that collide
     are listed. A table is a CSV file with the columns x, y, z (or tool_x, tool_y, tool_z with
     `--at tool`) and qw, qx, qy, qz, or yaw, pitch, roll, or azimuth, tilt, torsion. A heading may
     have a unit, such as x_mm, x [10 mm] or yaw_deg; without one it is the design's unit, or
-    degrees.
+    degrees. With `--machine` the joints are those that the encoders of that machine read; limits
+    are the design's.
     """
 
     poses: Annotated[Path | None, values.hint("instead of one pose", "FILE.csv")] = None
@@ -47,9 +48,15 @@ class InverseCommand(options.JsonOptions, options.PoseOptions):
     out: Annotated[Path | None, values.hint("with --poses", "FILE.csv")] = None
     """Table to write: joints, mode, pose, and the violated limits of each line."""
 
+    nominal_firmware: values.Flag = False
+    """Write into the table the poses to command a controller that knows the design alone."""
+
     def run(self) -> None:
         """Write the joints of the pose or of the poses."""
         design = self.read_design()
+        machine = self.read_machine(design)
+        if self.nominal_firmware and (machine is None or self.poses is None):
+            raise InputError("--nominal-firmware is for --machine FILE.json and --poses FILE.csv")
         files = _files("--poses", self.poses, self.out)
         if files is not None:
             if self.position is not None or self.folds is not None:
@@ -62,22 +69,35 @@ class InverseCommand(options.JsonOptions, options.PoseOptions):
                 )
             rotation = self.oriented_home(design).rotation
             poses = pose_tables.read_poses(table, design, rotation, self.at)
-            _write_answer(self, files, pose_tables.inverse_answer(table, poses, self.at))
+            joints = machine and machine.inverse(poses.positions, poses.rotations)
+            closes = None
+            if machine is not None and self.nominal_firmware:
+                position, rotation, closes = machine.commands(poses.positions, poses.rotations)
+                poses = Configuration(design, position, rotation)
+            answer = pose_tables.inverse_answer(table, poses, self.at, joints, closes)
+            _write_answer(self, files, answer)
             return
         snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
-        self.write(lambda: _inverse_json(snapshot, tool), _inverse_lines(snapshot, tool))
+        joints = (
+            machine.inverse(snapshot.pose.position, snapshot.rotation)
+            if machine
+            else snapshot.joints
+        )
+        self.write(
+            lambda: _inverse_json(snapshot, tool, joints), _inverse_lines(snapshot, tool, joints)
+        )
 
 
-def _inverse_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
+def _inverse_json(snapshot: Snapshot, tool: Triple | None, joints: FloatArray) -> dict[str, object]:
     folds = output.folds_in_degrees(snapshot.pose.position, snapshot.rotation)
-    answer = {"joints": snapshot.joints, "folds": folds, **output.limits_json(snapshot)}
+    answer = {"joints": joints, "folds": folds, **output.limits_json(snapshot)}
     return answer if tool is None else {**answer, **output.pose_json(snapshot.pose, tool)}
 
 
-def _inverse_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
+def _inverse_lines(snapshot: Snapshot, tool: Triple | None, joints: FloatArray) -> Iterator[str]:
     design, ranges = snapshot.design, joint_ranges(snapshot.design)
     rows = [("joint", "units", "mm", "limits")]
-    for name, value in zip(JOINTS, snapshot.joints.tolist(), strict=True):
+    for name, value in zip(JOINTS, joints.tolist(), strict=True):
         bounds = ranges.get(name)
         allowed = f"{bounds[0]:.6g} to {bounds[1]:.6g}" if bounds else "none"
         rows.append((name, *output.lengths(design, value, design.reach), allowed))
@@ -126,11 +146,12 @@ def _write_answer(
 
 
 @dataclass(frozen=True, kw_only=True)
-class ForwardCommand(options.JsonOptions, options.PointOptions):
+class ForwardCommand(options.JsonOptions, options.MachineOptions, options.PointOptions):
     """Compute the eight assembly modes of the joints, or of a table of joints.
 
     All eight are real or none is. If none is, the exit status is 1 and the message names the
-    failing trilateration and the smallest change of a joint that makes it feasible.
+    failing trilateration and the smallest change of a joint that makes it feasible. With
+    `--machine` the joints are what the encoders of that machine read, and poses are the true ones.
     """
 
     joints: Annotated[Six | None, values.numbers(" ".join(JOINTS)), values.OPTIONAL] = None
@@ -146,21 +167,28 @@ class ForwardCommand(options.JsonOptions, options.PointOptions):
     def run(self) -> None:
         """Write all eight poses of the joints."""
         design = self.read_design()
+        machine = self.read_machine(design)
         files = _files("--joints-file", self.joints_file, self.out)
         if (files is None) == (self.joints is None):
             raise InputError("give either --joints or --joints-file")
         if files is not None:
             table = pose_tables.read_table(files[0], design.unit_mm)
             joints = pose_tables.read_joints(table)
-            _write_answer(self, files, pose_tables.forward_answer(table, design, joints, self.at))
+            modes = machine and machine.modes(joints)
+            answer = pose_tables.forward_answer(table, design, joints, self.at, modes)
+            _write_answer(self, files, answer)
             return
         joints = np.array(self.joints, dtype=np.float64)
         squares = kinematics.discriminants(design, joints)
-        modes = kinematics.forward(design, joints)
+        modes = machine.modes(joints) if machine else kinematics.forward(design, joints)
         if not modes.feasible:
             if self.json:
                 output.write_json({"feasible": False, "discriminants": squares, "modes": []})
-            raise NoAnswerError(_failure_message(design, joints, squares))
+            raise NoAnswerError(
+                "the legs of the machine do not close in every mode: move away from singular poses"
+                if machine and (squares > 0.0).all()
+                else _failure_message(design, joints, squares)
+            )
         tool = design.tool.position
         shown_tool = tool if self.at == "tool" or any(tool) else None
         rows = [("joint", *JOINTS), ("units", *output.figures(joints.tolist()))]

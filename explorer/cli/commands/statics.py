@@ -163,8 +163,8 @@ class AccuracyCommand(options.TypicalOptions, LoadOptions):
 
     Errors, stiffness, struts and tolerances are those of the design; a design without them is
     exact and rigid. The model is linear, without preload, and joints, carriages, guide, platform
-    and base are rigid. Squareness of the struts to the guide, play and straightness of the guide
-    are no errors of it. RMS errors are those of independent errors, each uniform within its bounds.
+    and base are rigid. Play and straightness of the guide are no errors of it. RMS errors are those
+    of independent errors, each uniform within its bounds.
     """
 
     errors: Annotated[values.OfActuators, values.OF_DESIGN] = None

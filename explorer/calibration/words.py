@@ -1,0 +1,71 @@
+"""The machine that was identified, in words: what is seen, where it deviates, and its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from explorer.calibration.identify import Calibration
+from explorer.measures.blocks import block
+from explorer.numerics.arrays import lengths_of
+from explorer.statics.accuracy import SOURCES, UNITS, drawing_values
+
+DIGITS = 3
+
+
+def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
+    """Yield the blocks that tell a calibration."""
+    machine, unit = found.machine, found.machine.design.unit_mm
+    for fault in found.faults:
+        yield block.Statement("", fault, "beyond")
+    before, after = (
+        block.Number(unit * each, " mm", DIGITS) for each in (found.tool_before, found.tool_after)
+    )
+    if found.gains:
+        yield block.Statement(
+            "The tool", (before, " before, ", after, " after, RMS where nothing was measured")
+        )
+    seen = f"{found.seen} of {found.seen + len(found.unseen)} seen"
+    yield block.Statement(seen, "; ".join(unseen_words(found.unseen)))
+    a1, b4 = (unit * lengths_of(machine.defects)).tolist()
+    nominal, own = found.held_out.tolist()
+    left_out = ", ".join(str(1 + k) for k in found.outliers.tolist()) or "none"
+    yield block.Facts(
+        "Measurement and machine",
+        (
+            block.Fact("a1 beside the guide", (block.Number(a1, " mm", DIGITS),)),
+            block.Fact("b4 beside the line b2b3", (block.Number(b4, " mm", DIGITS),)),
+            block.Fact(
+                "poses held out",
+                (block.Number(own, "σ", DIGITS), " off, ", block.Number(nominal, "σ", DIGITS)),
+                "the latter by the design",
+            ),
+            block.Fact("χ²", (block.Number(found.chi_square), f" of {found.degrees} expected")),
+            block.Fact("poses left out as wrong", left_out),
+        ),
+    )
+    values, errors = (
+        drawing_values(machine.design, each).tolist()
+        for each in (machine.deviations, np.sqrt(found.covariance.diagonal()))
+    )
+    units = [" mm" if unit == "mm" else "°" for unit in UNITS]
+    yield block.Table(
+        "Deviations",
+        (
+            block.Names("source", SOURCES),
+            block.Column("deviation", values, units, DIGITS),
+            block.Column("standard error", errors, units, DIGITS, before="± "),
+        ),
+        "Most likely deviations: true less read values of the joints, then true less drawn ones.",
+    )
+
+
+def unseen_words(unseen: tuple[str, ...]) -> Iterator[str]:
+    """Yield what a measurement does not show, and what that means."""
+    frames = {name.split()[0] for name in unseen if name not in SOURCES} - {"guide"}
+    if any("with" in name for name in unseen):
+        yield "the zeros of d1 and d3 cannot be told from the guide's x, which changes no pose"
+    for frame in sorted(frames):
+        yield f"where the {frame}'s own frame is: positions count from where it was drawn"
+    yield from (name for name in unseen if name in SOURCES)

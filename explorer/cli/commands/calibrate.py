@@ -1,0 +1,159 @@
+"""`explorer calibrate`: the machine that was built, and the poses in which to measure it."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import tyro
+
+from explorer.calibration.identify import Calibration, calibrate
+from explorer.calibration.machine_file import encode_machine
+from explorer.calibration.measured import Kind, Measured
+from explorer.calibration.poses import calibration_poses
+from explorer.calibration.words import calibration_blocks
+from explorer.cli import options, output, values
+from explorer.errors import InputError, NoAnswerError
+from explorer.export import pose_tables
+from explorer.export.measured_tables import kind_of, read_measured
+from explorer.files.writing import check_writable, write_whole
+from explorer.mechanism.design import Design
+
+_MEASURED, _POSES = values.hint("to identify a machine", "FILE.csv"), values.hint("with poses")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.DesignOptions):
+    """Identify the machine that was built, or choose the poses in which to measure it.
+
+    `explorer calibrate poses` writes poses with their joints. Send the machine there, add the
+    columns of what you measure, and give that table with `--measured`: bar_mm (distance of a point
+    of the platform from a ball of the base), gauge_mm (from planes, in turn), t1_x_mm to t3_z_mm
+    (targets of a tracker), or else x_mm, y_mm, z_mm, qw, qx, qy, qz of the platform itself; and
+    sigma_mm if lines differ. The machine's file is for `--machine` of other commands. The exit
+    status is 1 if poses are too few, if the sum of squares is too large, or if nothing is gained;
+    then, as the design is as good, no file is written.
+    """
+
+    what: Annotated[Literal["machine", "poses"], tyro.conf.Positional] = "machine"
+    """Answer: the machine, or poses to measure."""
+
+    out: Path
+    """File to write: the machine (JSON), or the poses (CSV)."""
+
+    measured: Annotated[Path | None, _MEASURED] = None
+    """Table of the joints that the encoders read, and of what was measured there."""
+
+    measure: Annotated[Kind, _POSES] = "poses"
+    """What will be measured."""
+
+    count: Annotated[int, values.whole_number(1, 10_000), _POSES] = 12
+    """Number of poses."""
+
+    targets: Annotated[Path | None, values.FILE] = None
+    """Table of up to three measured points of the platform, with the columns x, y and z; of bar and
+    gauge the tool by default."""
+
+    known: values.Flag = False
+    """Take the targets to be exactly there, rather than about there."""
+
+    other_frame: values.Flag = False
+    """Take poses or targets to be in a frame of their own, rather than in the base's."""
+
+    ball: Annotated[values.Position, values.hint("bar")] = None
+    """About where the ball of the base is, in design units."""
+
+    planes: Annotated[values.Planes, values.hint("gauge; default: 0 0 1 0")] = (0.0, 0.0, 1.0, 0.0)
+    """About where the planes are, in the base frame: normals, and distances in design units."""
+
+    sigma: Annotated[float, values.POSITIVE] = 0.01
+    """Standard deviation of measured lengths, in millimetres."""
+
+    sigma_deg: Annotated[float, values.POSITIVE] = 0.005
+    """Standard deviation of measured turns, in degrees."""
+
+    def run(self) -> None:
+        """Write the machine or the poses."""
+        check_writable(self.out)
+        nominal = self.read_design()
+        design, assumed = self.with_typical(nominal)
+        if (self.measured is None) != (self.what == "poses"):
+            raise InputError("give either --measured FILE.csv, or the word poses")
+        if self.measured is None:
+            poses = calibration_poses(design, self.count, self._setup(design, self.measure))
+            rows = [(1 + k, list[str]()) for k in range(self.count)]
+            table = pose_tables.PoseTable("", (), {}, rows, ".")
+            write_whole(self.out, pose_tables.inverse_answer(table, poses).csv.encode())
+            lines = [*output.assumed_lines(assumed), f"poses written to {self.out}: {self.count}"]
+            self.write(lambda: {"file": self.out, "count": self.count, "assumed": assumed}, lines)
+            return
+        table = pose_tables.read_table(self.measured, design.unit_mm)
+        found = calibrate(
+            design, *read_measured(table, design, self._setup(design, kind_of(table)))
+        )
+        date = dt.datetime.now().astimezone().date().isoformat()
+        data = encode_machine(found.machine, found.unseen, date)
+        if found.gains:
+            write_whole(self.out, data)
+        self.write(
+            lambda: {
+                "file": self.out if found.gains else None,
+                "assumed": assumed,
+                "machine": json.loads(data),
+                **_json(found),
+            },
+            self._lines(nominal, assumed, found),
+            [NoAnswerError(fault) for fault in found.faults],
+        )
+
+    def _setup(self, design: Design, kind: Kind) -> Measured:
+        """Return the setup of a kind of measurement, without values."""
+        if kind == "targets" and self.targets is None:
+            raise InputError("targets are where --targets FILE.csv says, with the columns x, y, z")
+        if kind == "bar" and self.ball is None:
+            raise InputError("--ball X Y Z says about where the ball of the base is")
+        points = np.array([design.tool.position])
+        if self.targets is not None:
+            points = pose_tables.read_table(self.targets, design.unit_mm).numbers(*"xyz")[:3]
+        balls, planes = np.array([self.ball or ()]), np.reshape(self.planes or (), (-1, 4))
+        sizes = np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+        if not sizes.all():
+            raise InputError("--planes NX NY NZ DISTANCE: a normal must not be all zeros")
+        planes[:, :3] /= sizes
+        lengths = np.full(3, self.sigma / design.unit_mm)
+        return Measured(
+            kind,
+            np.empty((0, 1)),
+            np.array([*lengths, *np.radians([self.sigma_deg] * 3)])
+            if kind == "poses"
+            else lengths[0],
+            np.zeros((1, 3)) if kind == "poses" else points,
+            points_known=self.known,
+            in_base=not self.other_frame or kind in ("bar", "gauge"),
+            base={"bar": balls, "gauge": planes}.get(kind, np.zeros((0, 3))),
+            plane=np.arange(max(1, len(planes))),
+        )
+
+    def _lines(self, design: Design, assumed: tuple[str, ...], found: Calibration) -> Iterator[str]:
+        yield from (output.heading(design), *output.assumed_lines(assumed))
+        yield from output.block_lines(calibration_blocks(found))
+        if found.gains:
+            yield from ("", f"written to {self.out}")
+
+
+def _json(found: Calibration) -> dict[str, object]:
+    """Return the numbers of a calibration as plain values; poses count from 1."""
+    unit = found.machine.design.unit_mm
+    return {
+        **output.attributes(found, "seen unseen chi_square degrees"),
+        "outliers": 1 + found.outliers,
+        "tool_before_mm": unit * found.tool_before,
+        "tool_after_mm": unit * found.tool_after,
+        "held_out": dict(zip(("design", "machine"), found.held_out.tolist(), strict=True)),
+        "faults": found.faults,
+    }
