@@ -15,10 +15,12 @@ import numpy as np
 from explorer import __version__
 from explorer.files.packaged import packaged_file
 from explorer.legs.clearance import PAIRS
+from explorer.mechanism.built_machine import BuiltMachine
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.margins import margins, mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.statics.accuracy import IS_TILT, SOURCES
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.table import demands_of
 from explorer.workspace.limits.valid_poses import Rules
@@ -37,8 +39,11 @@ LIMIT_NAMES = (
 each name begins with `F44_`."""
 
 
-def kernel_files(design: Design) -> dict[str, bytes]:
-    """Return header and source of the kernel of a design, by the names of the files."""
+def kernel_files(design: Design, machine: BuiltMachine | None = None) -> dict[str, bytes]:
+    """Return header and source of the kernel of a design, by the names of the files.
+
+    They have the deviations of a machine that was built of it, if one is given.
+    """
     unit, pose = design.unit_mm, design.home_pose
     rows, axes, words = limit_rows(design)
     radii, pair_words = pair_rows(design)
@@ -55,6 +60,7 @@ def kernel_files(design: Design) -> dict[str, bytes]:
         "rotation": ",\n *             ".join(map(_numbers, pose.rotation + 0.0)),
         "size": _number(max(map(abs, variables))),
         "ranges": _table(rows),
+        "deviations": _numbers(deviations_in_mm(design, machine)),
         "axes": _table(axes),
         "radii": _numbers(radii),
         "bits": "\n".join(
@@ -67,6 +73,12 @@ def kernel_files(design: Design) -> dict[str, bytes]:
         name: Template(read_template(f"{name}.in")).substitute(fields).encode()
         for name in KERNEL_FILES
     }
+
+
+def deviations_in_mm(design: Design, machine: BuiltMachine | None) -> FloatArray:
+    """Return the deviations of a machine, zeros for None, in millimetres and radians, (31,)."""
+    deviations = np.zeros(len(SOURCES)) if machine is None else machine.deviations
+    return np.where(IS_TILT, deviations, deviations * design.unit_mm)
 
 
 def read_template(file: str) -> str:

@@ -14,7 +14,8 @@ import numpy as np
 
 from explorer import __version__
 from explorer.errors import NoAnswerError
-from explorer.export.controller import LIMIT_NAMES, kernel_files, read_template
+from explorer.export.controller import LIMIT_NAMES, deviations_in_mm, kernel_files, read_template
+from explorer.mechanism.built_machine import BuiltMachine
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, Design
 from explorer.mechanism.kinematics import inverse
@@ -22,6 +23,7 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding
+from explorer.statics.accuracy import IS_TILT, SOURCES, UNITS
 from explorer.workspace.limits.valid_poses import violations
 
 LINUXCNC_FILES = (
@@ -49,8 +51,10 @@ LIMIT_DIGITS = 12
 JOINT_SPEED_RATIO = 3.0
 
 
-def linuxcnc_files(design: Design) -> dict[str, bytes]:
+def linuxcnc_files(design: Design, machine: BuiltMachine | None = None) -> dict[str, bytes]:
     """Return the files of the configuration of a design, with its kernel, by their names.
+
+    The component has the deviations of a machine that was built of it, if one is given.
 
     Raises:
         NoAnswerError: The home pose, in which LinuxCNC begins, breaks limits or is singular.
@@ -63,6 +67,13 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
     world = list(map(_number, at, [*3 * [unit * design.reach], *3 * [360.0]]))
     axes, joints = axis_ranges(design), joint_ranges(design)
     linear, angular = axis_speeds(design)
+    deviations = deviations_in_mm(design, machine)
+    parameters = [
+        (name.replace(" ", "_"), unit_name, math.degrees(value) if is_tilt else value, is_tilt)
+        for name, unit_name, value, is_tilt in zip(
+            SOURCES, UNITS, deviations.tolist(), IS_TILT, strict=True
+        )
+    ]
     speeds, slack = 3 * [linear] + 3 * [angular], unit * design.tolerance
     fields = {
         "name": design.name,
@@ -70,6 +81,14 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
         "mode": mode_of(margins(pose.position, pose.rotation)),
         "signs": ", ".join("positive" if sign > 0 else "negative" for sign in design.home_signs),
         "names": "\n".join(f'    "{name.lower().replace("_", " ")}",' for name in LIMIT_NAMES),
+        "parameters": "\n".join(
+            f'param rw float {name} = {value!r} "Deviation in {unit_name}";'
+            for name, unit_name, value, _ in parameters
+        ),
+        "deviations": "\n".join(
+            f"        {'DEGREE * ' if is_tilt else ''}hal->{name},"
+            for name, *_, is_tilt in parameters
+        ),
         "home": " ".join(world),
         "move": " ".join(map("".join, zip(AXES, world, strict=True))),
         "blend": _number(float(f"{unit * design.reach / BLENDS:.1g}")),
@@ -100,7 +119,7 @@ def linuxcnc_files(design: Design) -> dict[str, bytes]:
         name: Template(read_template(f"linuxcnc/{name}.in")).substitute(fields).encode()
         for name in LINUXCNC_FILES
     }
-    return own | kernel_files(design)
+    return own | kernel_files(design, machine)
 
 
 def axis_ranges(design: Design) -> FloatArray:

@@ -19,8 +19,10 @@ from benchmarks.samples import DESIGN, around_home
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer import from_folds, inverse, margins, to_folds
+from explorer.mechanism.design_file import typical_machine
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.prototype.imperfect import ImperfectMachine
 
 COUNT, CACHED, ROUNDS = 20_000, 500, 20
 # Where the iteration starts, as a share of the reach and in radians: a cycle of a controller away.
@@ -76,10 +78,28 @@ def run() -> Iterator[Row]:
     if COMPILER is None:
         yield Row("kernel for controllers", "no C compiler `cc` on this machine")
         return
+    machine = ImperfectMachine.draw(typical_machine(DESIGN)[0], 0)
     with TemporaryDirectory() as folder:
         extra = [Path(__file__).parent / "six_lengths.c"]
-        kernel = CompiledKernel(DESIGN, Path(folder), ["-O2"], extra)
+        kernel = CompiledKernel(DESIGN, Path(folder), ["-O2"], extra, machine)
         yield from rows_of(kernel, Newton(kernel))
+        yield row_of_machine(kernel)
+
+
+def row_of_machine(kernel: CompiledKernel) -> Row:
+    """Return the row of a machine that was built, beside its design."""
+    positions, rotations, _ = around_home(CACHED)
+    poses, out = (UNIT * positions, rotations.copy()), np.empty((CACHED, 6))
+    built, nominal = (
+        best_of(50 * ROUNDS, lambda name=name: kernel.run(name, *poses, out)) / CACHED
+        for name in ("built_inverse_rows", "inverse_rows")
+    )
+    return Row(
+        "kernel in C, inverse kinematics of a machine with 31 deviations",
+        seconds(built),
+        f"{seconds(1.1 * nominal)}, 1.1 of the design's",
+        f"of the design: {seconds(nominal)}; {built / nominal:.2f} of it",
+    )
 
 
 def rows_of(kernel: CompiledKernel, newton: Newton) -> Iterator[Row]:

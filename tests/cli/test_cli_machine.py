@@ -127,6 +127,25 @@ def test_simulation_is_that_of_the_machine(cli: CommandLine, file: Path, tmp_pat
     assert "give either --errors SEED or --machine" in cli.run(*argv, status=2)[1]
 
 
+@pytest.mark.parametrize("what", ["kernel", "linuxcnc"])
+def test_code_for_controllers_has_the_deviations(
+    cli: CommandLine, file: Path, tmp_path: Path, what: str
+) -> None:
+    out, machine = tmp_path / what, machine_in(file)
+    cli.answer("export", what, "--out", out, "--machine", file)
+    texts = [each.read_text() for each in out.iterdir()]
+    for value in 10.0 * machine.deviations[:6]:
+        assert sum(text.count(repr(float(value))) for text in texts) == (
+            1 if what == "kernel" else 2
+        )
+    assert (
+        "--machine is not for"
+        in cli.run("export", "page", "--out", tmp_path / "page.html", "--machine", file, status=2)[
+            1
+        ]
+    )
+
+
 def test_machine_of_another_design_is_refused_with_both_names(
     cli: CommandLine, file: Path, tmp_path: Path
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import configparser
 import ctypes
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -13,17 +14,25 @@ import msgspec
 import numpy as np
 import pytest
 from compiled_kernel import COMPILER, SANITIZED, CompiledKernel, compile_c
-from exported_designs import in_mm, limited_design, poses_about_home, size_of
+from exported_designs import (
+    in_mm,
+    limited_design,
+    machine_of,
+    poses_about_home,
+    scaled,
+    size_of,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, Pose, forward, inverse, jacobian
+from explorer import PRESETS, BuiltMachine, Design, Pose, forward, inverse, jacobian
 from explorer.errors import NoAnswerError
 from explorer.export.controller import LIMIT_NAMES
 from explorer.export.linuxcnc import axis_speeds, linuxcnc_files
 from explorer.mechanism.design import JOINTS, LENGTHS
 from explorer.mechanism.margins import margins, mode_of
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.statics.accuracy import SOURCES, drawing_values
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
@@ -40,17 +49,45 @@ SUPPORT = Path(__file__).parents[1] / "support" / "linuxcnc"
 OF_LINUXCNC = ("X", "Y", "Z", "D1", "D3", *(name.upper() for name in LENGTHS))
 
 
+def state_of(declared: str) -> str:
+    """Return what halcompile makes of pins and parameters, each of which is a global variable."""
+    pins = re.findall(r"^pin in float (\w+)", declared, re.MULTILINE)
+    parameters = re.findall(r"^param rw float (\w+) = (\S+) ", declared, re.MULTILINE)
+    assert len(pins) + len(parameters) == declared.count("float")
+    assert "\noption no_convenience_defines yes;\n" in declared
+    return "\n".join(
+        [
+            *(f"double hal_{name};" for name in pins),
+            *(f"double hal_{name} = {value};" for name, value in parameters),
+            "static struct __comp_state {",
+            *(f"    double *{name};" for name in pins),
+            *(f"    double {name};" for name, _ in parameters),
+            "} state, *__comp_first_inst = &state;",
+            "void update_state(void)\n{",
+            *(f"    state.{name} = &hal_{name};" for name in pins),
+            *(f"    state.{name} = hal_{name};" for name, _ in parameters),
+            "}\n",
+        ]
+    )
+
+
 class Component:
     """The component of a design, compiled around stubs of LinuxCNC, over n rows."""
 
-    def __init__(self, design: Design, folder: Path) -> None:
-        files = linuxcnc_files(design)
+    def __init__(self, design: Design, folder: Path, machine: BuiltMachine | None = None) -> None:
+        files = linuxcnc_files(design, machine)
         (folder / "flagged44.h").write_bytes(files["flagged44.h"])
         (folder / "flagged44.c").write_bytes(files["flagged44.c"])
-        (folder / "flagged44kins.c").write_bytes(files["flagged44kins.comp"].split(b"\n;;\n")[1])
+        declared, code = files["flagged44kins.comp"].decode().split("\n;;\n")
+        (folder / "flagged44kins.c").write_text(state_of(declared) + code, "utf-8")
         sources, options = [SUPPORT / "kinematics_rows.c"], ("-shared", "-fPIC", f"-I{SUPPORT}")
         library = compile_c(folder / "kinematics.so", sources, *SANITIZED, *options)
         self.library = ctypes.CDLL(str(library))
+
+    def set(self, **values: float) -> None:
+        """Set pins of the tool and parameters."""
+        for name, value in values.items():
+            ctypes.c_double.in_dll(self.library, f"hal_{name}").value = value
 
     @property
     def message(self) -> str:
@@ -238,6 +275,51 @@ def test_moves_begin_where_joints_were_jogged_and_lead_back(tmp_path: Path) -> N
     assert results == 0
     turned = Rotation.from_euler("xyz", found[:, 3:], degrees=True).as_matrix()
     assert_allclose(turned, rotation, rtol=0, atol=1e-6)
+
+
+@compiled
+@pytest.mark.parametrize("name", ["paper-optimal", "limited"])
+def test_component_of_a_machine_has_its_joints_and_poses(name: str, tmp_path: Path) -> None:
+    machine = machine_of(DESIGNS[name], 3)
+    component = Component(DESIGNS[name], tmp_path, machine)
+    machine = scaled(machine)
+    design, mode = machine.design, home_mode(DESIGNS[name])
+    size, poses = size_of(design), poses_about_home(design, 5000, 1)
+    worlds, expected = world_of(*poses), machine.inverse(*poses)
+    found, results = component.inverse(worlds)
+    allowed = results == 0
+    assert allowed.sum() > 50
+    assert_allclose(found[allowed], expected[allowed], rtol=0, atol=1e-12 * size)
+    regular = np.abs(margins(*poses)).min(axis=1) > 0.1 * size
+    regular &= mode_of(margins(*poses)) == mode
+    found, results = component.forward(expected[regular], worlds[regular])
+    assert (results == 0).all()
+    assert_allclose(found, worlds[regular], rtol=0, atol=1e-7 * size)
+    # Parameters that are set while it runs are those of another machine.
+    other = scaled(machine_of(DESIGNS[name], 4))
+    values = drawing_values(design, other.deviations).tolist()
+    component.set(**dict(zip((n.replace(" ", "_") for n in SOURCES), values, strict=True)))
+    found, _ = component.inverse(worlds)
+    expected = other.inverse(*poses)
+    assert_allclose(found[allowed], expected[allowed], rtol=0, atol=1e-12 * size)
+
+
+@compiled
+def test_tool_turns_with_the_platform(tmp_path: Path) -> None:
+    component, design = Component(OPTIMAL, tmp_path), in_mm(OPTIMAL)
+    position, rotation = poses_about_home(design, 2000, 2)
+    allowed = component.inverse(world_of(position, rotation))[1] == 0
+    position, rotation = position[allowed], rotation[allowed]
+    offset = np.array([3.0, -5.0, 40.0])
+    component.set(tool_x=3.0, tool_y=-5.0, tool_z=40.0)
+    # LinuxCNC adds the offset to what is programmed: the tip, from which it leads to b4.
+    tips = position - rotation @ offset
+    found, results = component.inverse(world_of(tips + offset, rotation))
+    assert (results == 0).all()
+    joints = inverse(design, position, rotation)
+    assert_allclose(found, joints, rtol=0, atol=1e-11 * size_of(design))
+    back, results = component.forward(joints, world_of(tips, rotation))
+    assert_allclose(back[:, :3], tips + offset, rtol=0, atol=1e-7)
 
 
 def test_home_that_breaks_limits_is_refused() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from explorer import Design
+from explorer import BuiltMachine, Design
 from explorer.export.controller import kernel_files
 from explorer.numerics.arrays import FloatArray, IntArray
 
@@ -38,6 +38,7 @@ class CompiledKernel:
         folder: Where its files are written and compiled.
         options: Further options of the compiler.
         extra: Further C sources of the library.
+        machine: The machine that was built of the design.
     """
 
     def __init__(
@@ -46,8 +47,9 @@ class CompiledKernel:
         folder: Path,
         options: Sequence[str] = SANITIZED,
         extra: Sequence[Path] = (),
+        machine: BuiltMachine | None = None,
     ) -> None:
-        for name, data in kernel_files(design).items():
+        for name, data in kernel_files(design, machine).items():
             (folder / name).write_bytes(data)
         sources = (folder / "flagged44.c", ROWS, *extra)
         library = compile_c(folder / "kernel.so", sources, "-shared", "-fPIC", *options)
@@ -90,6 +92,19 @@ class CompiledKernel:
         rotations, modes = np.full((count, 8, 3, 3), np.nan), np.empty(count, dtype=np.intc)
         self.run("forward_rows", joints, positions, rotations, modes)
         return positions, rotations, modes.astype(np.int64)
+
+    def built_inverse(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return the joints (n, 6) of the machine."""
+        return self._of_poses("built_inverse_rows", position, rotation, 6)
+
+    def built_forward(
+        self, joints: FloatArray, modes: IntArray
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return positions (n, 3), rotations (n, 3, 3) of the machine, and 1 where it closes."""
+        count = len(joints)
+        out = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count, dtype=np.intc)
+        self.run("built_forward_rows", joints, modes.astype(np.intc), *out)
+        return out[0], out[1], out[2].astype(np.int64)
 
     def _of_poses(
         self, function: str, position: FloatArray, rotation: FloatArray, columns: int

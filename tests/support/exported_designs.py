@@ -7,9 +7,10 @@ import numpy as np
 from limited_designs import ordinary_case, scaled_design
 from scipy.spatial.transform import Rotation
 
-from explorer import Design, from_folds
+from explorer import BuiltMachine, Design, from_folds
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.accuracy import IS_TILT
 
 
 def limited_design(seed: int) -> Design:
@@ -48,3 +49,15 @@ def poses_about_home(design: Design, count: int, seed: int) -> tuple[FloatArray,
     positions = np.array(home.position) + steps * size_of(design) * rng.normal(size=(count, 3))
     turns = Rotation.from_rotvec(steps * rng.normal(size=(count, 3))).as_matrix()
     return positions, turns @ home.rotation
+
+
+def machine_of(design: Design, seed: int, share: float = 1e-3) -> BuiltMachine:
+    """Return a random machine, whose points are off by a share of its size, and angles by 0.1°."""
+    sizes = np.where(IS_TILT, np.radians(0.1), share * size_of(design))
+    return BuiltMachine(design, sizes * np.random.default_rng(seed).uniform(-1.0, 1.0, 31))
+
+
+def scaled(machine: BuiltMachine) -> BuiltMachine:
+    """Return a machine with its lengths in millimetres."""
+    unit = np.where(IS_TILT, 1.0, machine.design.unit_mm)
+    return BuiltMachine(in_mm(machine.design), unit * machine.deviations)

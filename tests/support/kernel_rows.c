@@ -40,3 +40,21 @@ void limit_rows(long n, const double (*p)[3], const double (*r)[9], unsigned *br
     for (long k = 0; k < n; k++)
         broken[k] = f44_limits(p[k], r[k]);
 }
+
+/* The machine has the deviations with which the kernel was exported. */
+void built_inverse_rows(long n, const double (*p)[3], const double (*r)[9], double (*joints)[6])
+{
+    struct f44_machine machine;
+    f44_build(F44_DEVIATIONS, &machine);
+    for (long k = 0; k < n; k++)
+        f44_built_inverse(&machine, p[k], r[k], joints[k]);
+}
+
+void built_forward_rows(long n, const double (*joints)[6], const int *modes, double (*p)[3],
+                        double (*r)[9], int *closes)
+{
+    struct f44_machine machine;
+    f44_build(F44_DEVIATIONS, &machine);
+    for (long k = 0; k < n; k++)
+        closes[k] = f44_built_forward(&machine, joints[k], modes[k], p[k], r[k]);
+}

@@ -301,7 +301,8 @@ def _figure(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
 def _folder(command: ExportCommand, file_format: str) -> tuple[dict[str, bytes], Facts]:
     name, only, files_of = _FOLDERS[command.what]
     _check_format(file_format, name, only)
-    files = files_of(command.read_design())
+    design = command.read_design()
+    files = files_of(design, command.read_machine(design))
     return files, {"format": only, "files": list(files)}
 
 
@@ -313,7 +314,7 @@ def _check_format(file_format: str, name: str, only: str, suffix: str | None = N
 
 _ORIENTATION = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
 _POSE = ("position", "folds", *_ORIENTATION)
-_FOLDERS: dict[What, tuple[str, str, Callable[[Design], dict[str, bytes]]]] = {
+_FOLDERS: dict[What, tuple[str, str, Callable[..., dict[str, bytes]]]] = {
     "kernel": ("kernel", "c", kernel_files),
     "linuxcnc": ("configuration", "ini", linuxcnc_files),
 }
@@ -326,8 +327,8 @@ _WRITERS: dict[What, tuple[Callable[[ExportCommand, str], tuple[Data, Facts]], t
     "scene": (_scene, _POSE),
     "page": (_page, ()),
     "figure": (_figure, (*_POSE, "view", "width", "black", "tetrahedra")),
-    "kernel": (_folder, ()),
-    "linuxcnc": (_folder, ()),
+    "kernel": (_folder, ("machine",)),
+    "linuxcnc": (_folder, ("machine",)),
 }
 """The function that writes each object, and its options besides those of all."""
 

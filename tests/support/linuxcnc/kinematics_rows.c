@@ -3,6 +3,7 @@
 
 void inverse_rows(long n, const double (*worlds)[6], double (*joints)[6], int *results)
 {
+    update_state();
     for (long k = 0; k < n; k++) {
         const double *w = worlds[k];
         const EmcPose pose = {{w[0], w[1], w[2]}, w[3], w[4], w[5], 0.0, 0.0, 0.0};
@@ -15,6 +16,7 @@ void inverse_rows(long n, const double (*worlds)[6], double (*joints)[6], int *r
 /* Worlds are those before, then those of the joints. */
 void forward_rows(long n, const double (*joints)[6], double (*worlds)[6], int *results)
 {
+    update_state();
     for (long k = 0; k < n; k++) {
         double *w = worlds[k];
         EmcPose pose = {{w[0], w[1], w[2]}, w[3], w[4], w[5], 0.0, 0.0, 0.0};
