@@ -37,6 +37,11 @@ def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
             block.Fact("a1 beside the guide", (block.Number(a1, " mm", DIGITS),)),
             block.Fact("b4 beside the line b2b3", (block.Number(b4, " mm", DIGITS),)),
             block.Fact(
+                "allowance of the margins",
+                (block.Number(unit * machine.allowance, " mm", DIGITS),),
+                "for both, which make no exact flags",
+            ),
+            block.Fact(
                 "poses held out",
                 (block.Number(own, "σ", DIGITS), " off, ", block.Number(nominal, "σ", DIGITS)),
                 "the latter by the design",

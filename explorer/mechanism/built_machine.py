@@ -121,6 +121,14 @@ class BuiltMachine:
         """Places of a1 beside the guide and of b4 beside the line b2b3, shape (2, 2), in units."""
         return np.stack([self.bases[0, 1:], self.platform[1][1, 1:]])
 
+    @property
+    def allowance(self) -> float:
+        """Most by which a margin is not zero in singular poses, for the defects, in design units.
+
+        The other deviations move and change the flags, and leave them flags.
+        """
+        return float(lengths_of(self.defects).sum())
+
     def ends_seen(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Return b1 to b4 in n poses as the unmoved bases of their legs see them, (n, 4, 3)."""
         arms = position[:, None] + self.points @ np.swapaxes(rotation, 1, 2) - self.shifts

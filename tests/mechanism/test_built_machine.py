@@ -13,7 +13,7 @@ from explorer import Configuration, Design, margins
 from explorer.mechanism import built_machine
 from explorer.mechanism.built_machine import COUNT, BuiltMachine
 from explorer.mechanism.machine import A1, GUIDE, PLATFORM, STRUTS
-from explorer.mechanism.margins import mode_of, signs_of
+from explorer.mechanism.margins import mode_of, planes_of_singularity, signs_of
 from explorer.numerics.arrays import FloatArray
 
 # Errors of encoders and lengths of 0.05 and 0.1 mm, of angles of 0.1°, in units of 10 mm.
@@ -159,3 +159,45 @@ def test_unusable_deviations_and_joints_are_refused() -> None:
     assert "not a batch" in refusal(BuiltMachine, OPTIMAL, np.zeros((2, COUNT)))
     machine = random_machine(0)
     assert "must not be negative" in refusal(machine.forward, [-1.0] * 6)
+
+
+def determinants(machine: BuiltMachine, position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return det J of a machine in poses, shape (n,), by differences of its joints."""
+    rows = np.empty((6, len(position), 6))
+    for k, step in enumerate(1e-5 * np.eye(6)):
+        turned = Rotation.from_rotvec(step[3:]).as_matrix()
+        there = machine.inverse(position + step[:3], turned @ rotation)
+        rows[k] = there - machine.inverse(position - step[:3], turned.T @ rotation)
+    return np.linalg.det(np.swapaxes(rows, 0, 1) / 2e-5)
+
+
+def test_defects_of_the_flags_move_singular_poses_by_no_more_than_the_allowance() -> None:
+    """The determinant changes its sign between the two sides of each plane of singularity."""
+    crossed, largest = 0, 0.0
+    for seed in range(30):
+        rng, off = np.random.default_rng(seed), np.zeros(COUNT)
+        # a1 beside the guide, and b4 beside the line b2b3.
+        places = [7, 8, *(6 + PLATFORM.start + np.array([10, 11]))]
+        off[places] = rng.uniform(-0.01, 0.01, 4)
+        machine = BuiltMachine(OPTIMAL, off)
+        assert machine.allowance == pytest.approx(
+            np.hypot(*off[[7, 8]]) + np.hypot(*off[places[2:]])
+        )
+        position = rng.uniform((2.0, -10.0, 2.0), (25.0, 20.0, 17.0), (300, 3))
+        turns = Rotation.from_rotvec(0.4 * rng.normal(size=(300, 3))).as_matrix()
+        rotation = turns @ OPTIMAL.home_pose.rotation
+        planes = planes_of_singularity(rotation)
+        for k in range(3):
+            length = np.linalg.norm(planes[:, k], axis=1, keepdims=True)
+            own = margins(position, rotation)[:, k, None] / length
+            foot = position - own * planes[:, k] / length
+            far = np.abs(np.delete(margins(foot, rotation), k, axis=1)).min(axis=1) > 3.0
+            step = machine.allowance * (planes[:, k] / length**2)[far]
+            sides = [
+                determinants(machine, foot[far] + s * step, rotation[far]) for s in (1.0, -1.0)
+            ]
+            assert (sides[0] * sides[1] < 0.0).all()
+            crossed += len(step)
+        largest = max(largest, machine.allowance * OPTIMAL.unit_mm)
+    assert crossed > 1000
+    assert largest < 0.3
