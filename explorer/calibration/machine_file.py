@@ -101,14 +101,14 @@ def decode_machine(data: bytes, source: str, design: Design) -> BuiltMachine:
     return BuiltMachine(design, np.where(IS_TILT, np.radians(values), values / design.unit_mm))
 
 
-def load_machine(path: Path, design: Design) -> BuiltMachine:
+def load_machine(path: str | Path, design: Design) -> BuiltMachine:
     """Return the machine of a design in a file.
 
     Raises:
         InputError: The file holds no machine, or one of another design.
         StorageError: The file cannot be read.
     """
-    return decode_machine(read_at_most(path), str(path), design)
+    return decode_machine(read_at_most(Path(path)), str(path), design)
 
 
 def _hash(design: Design) -> str:
