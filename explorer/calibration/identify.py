@@ -66,8 +66,9 @@ class Calibration:
         degrees: Its expectation.
         tool_before, tool_after: Root mean square errors of the tool over other poses, by the design
             and by the machine, but for the frames of the measurement, in design units.
-        held_out: Root mean squares of the residuals of lines that were held out, in standard
-            deviations, by the design and by machines of the other lines, shape (2,).
+        held_out: Root mean squares of lines that were held out, by the design and by machines of
+            the other lines, shape (2, 2): of all residuals, in standard deviations, and of
+            distances, in design units.
     """
 
     machine: BuiltMachine
@@ -96,7 +97,7 @@ class Calibration:
     @property
     def gains(self) -> bool:
         """Whether the machine tells lines that were held out better than the design does."""
-        return bool(self.held_out[1] < self.held_out[0])
+        return bool(self.held_out[1, 0] < self.held_out[0, 0])
 
     @property
     def faults(self) -> list[str]:
@@ -171,7 +172,7 @@ def calibrate(
     tool = error_by_source(poses)[:, :3] * spread @ (np.eye(COUNT) - frames @ frames.T)
     machine, squares = BuiltMachine(design, state[:COUNT] * spread), residuals[used] ** 2
     held_out = problem.held_out(state, used)
-    gains = held_out[1] < held_out[0]
+    gains = held_out[1, 0] < held_out[0, 0]
     reached = machine.forward(poses.joints)
     before = (
         reached.position - poses.position + tool_offset(reached.rotation, poses.tool) - poses.arm
@@ -245,20 +246,23 @@ class _Problem:
         )
 
     def held_out(self, state: FloatArray, used: BoolArray) -> FloatArray:
-        """Return the root mean squares of residuals of used lines that are held out, shape (2,).
+        """Return the root mean squares of used lines that are held out, as in `Calibration`.
 
         They are by the design, whose setup alone is fitted to the other lines, and by the machine.
         """
-        part, squares = np.cumsum(used) % FOLDS, np.full((2, len(used)), np.nan)
+        part, squares = np.cumsum(used) % FOLDS, np.full((2, 2, len(used)), np.nan)
+        sigma = np.broadcast_to(self.measured.sigma, self.measured.values.shape)
         for out in (used & (part == k) for k in range(min(FOLDS, int(used.sum())))):
             values = np.where((used & ~out)[:, None], self.measured.values, np.nan)
             rest = replace(self.measured, values=values)
             for row, spread in zip(squares, (0.0 * self.spread, self.spread), strict=True):
                 found = replace(self, spread=spread)
                 there = replace(found, measured=rest).settle(state, "linear", SETTLED)
-                row[out] = np.nanmean(found.lines(there)[0][out] ** 2, axis=1)
-        told = np.isfinite(squares).all(axis=0)
-        return np.sqrt(squares[:, told].sum(axis=1) / max(1, int(told.sum())))
+                off = found.lines(there)[0][out]
+                row[0, out] = np.nanmean(off**2, axis=1)
+                row[1, out] = self.measured.square_distances(off * sigma[out])
+        told = np.isfinite(squares).all(axis=(0, 1))
+        return np.sqrt(squares[..., told].sum(axis=-1) / max(1, int(told.sum())))
 
 
 def weights_of(residuals: FloatArray, kind: Weighting) -> FloatArray:

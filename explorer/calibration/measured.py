@@ -116,6 +116,11 @@ class Measured:
             off[:, 3:] = np.where(np.isnan(off[:, 3:]), np.nan, (there * here.inv()).as_rotvec())
         return off
 
+    def square_distances(self, off: FloatArray) -> FloatArray:
+        """Return mean squares of the distances in residuals (n, m) of values, shape (n,)."""
+        lengths = off[:, :3] if self.kind == "poses" else off
+        return np.nanmean(lengths**2, axis=1) * min(3, lengths.shape[1])
+
     def align(self, position: FloatArray, rotation: FloatArray) -> Measured:
         """Return values in the frame that fits best if the base's are of these poses."""
         if self.in_base:

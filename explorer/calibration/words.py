@@ -29,7 +29,7 @@ def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
     seen = f"{found.seen} of {found.seen + len(found.unseen)} seen"
     yield block.Statement(seen, "; ".join(unseen_words(found.unseen)))
     a1, b4 = (unit * lengths_of(machine.defects)).tolist()
-    nominal, own = found.held_out.tolist()
+    nominal, own = (unit * found.held_out[:, 1]).tolist()
     left_out = ", ".join(str(1 + k) for k in found.outliers.tolist()) or "none"
     yield block.Facts(
         "Measurement and machine",
@@ -43,8 +43,8 @@ def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
             ),
             block.Fact(
                 "poses held out",
-                (block.Number(own, "σ", DIGITS), " off, ", block.Number(nominal, "σ", DIGITS)),
-                "the latter by the design",
+                (block.Number(own, " mm", DIGITS), " off"),
+                (block.Number(nominal, " mm", DIGITS), " by the design"),
             ),
             block.Fact("χ²", (block.Number(found.chi_square), f" of {found.degrees} expected")),
             block.Fact("poses left out as wrong", left_out),

@@ -34,7 +34,7 @@ from explorer.mechanism.pose import quaternion_from_rotation
 TRUE = true_machine(np.random.default_rng(7))
 KEYS = {
     *("file", "assumed", "machine", "seen", "unseen", "chi_square", "degrees", "outliers"),
-    *("tool_before_mm", "tool_after_mm", "held_out", "faults"),
+    *("tool_before_mm", "tool_after_mm", "held_out_mm", "held_out_by_design_mm", "faults"),
 }
 
 
@@ -99,7 +99,7 @@ def test_poses_are_written_and_the_machine_found_there(
     assert found["unseen"] == found["machine"]["unseen"]
     assert found["seen"] + len(found["unseen"]) == 31
     assert 10.0 * found["tool_after_mm"] < found["tool_before_mm"]
-    assert 2.0 * found["held_out"]["machine"] < found["held_out"]["design"]
+    assert 2.0 * found["held_out_mm"] < found["held_out_by_design_mm"]
     machine = load_machine(out, TYPICAL)
     if kind.kind == "poses":
         assert rms(tool_errors(TRUE, machine)) < 0.02

@@ -154,6 +154,7 @@ def _json(found: Calibration) -> dict[str, object]:
         "outliers": 1 + found.outliers,
         "tool_before_mm": unit * found.tool_before,
         "tool_after_mm": unit * found.tool_after,
-        "held_out": dict(zip(("design", "machine"), found.held_out.tolist(), strict=True)),
+        "held_out_mm": unit * found.held_out[1, 1],
+        "held_out_by_design_mm": unit * found.held_out[0, 1],
         "faults": found.faults,
     }
