@@ -10,6 +10,7 @@ from collections import deque
 import numpy as np
 import viser
 
+from explorer.app.features.calibration.feature import CALIBRATION
 from explorer.app.features.compare.feature import COMPARE
 from explorer.app.features.designs.feature import DESIGNS
 from explorer.app.features.feature import Feature, Panel, Services
@@ -56,7 +57,7 @@ from explorer.page.widgets.palette import Command, Palette
 # The features, in the order of their tabs and of their parts of the bar.
 FEATURES: tuple[Feature, ...] = (
     DESIGNS, MECHANISM, REQUIREMENT, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, ORIENTATION,
-    LOADS, PROTOTYPE, LEGS, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
+    LOADS, CALIBRATION, PROTOTYPE, LEGS, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
 )  # fmt: skip
 # Modules that the process of the page imports at its start.
 TASKS = modules_of(feed for each in FEATURES for feed in (*each.feeds, *each.later_feeds))

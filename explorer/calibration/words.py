@@ -50,6 +50,7 @@ def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
             block.Fact("poses left out as wrong", left_out),
         ),
     )
+    yield _residuals(found)
     values, errors = (
         drawing_values(machine.design, each).tolist()
         for each in (machine.deviations, np.sqrt(found.covariance.diagonal()))
@@ -63,6 +64,25 @@ def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
             block.Column("standard error", errors, units, DIGITS, before="± "),
         ),
         "Most likely deviations: true less read values of the joints, then true less drawn ones.",
+    )
+
+
+def _residuals(found: Calibration) -> block.Table:
+    """Return what the machine leaves of each pose, as numbers and as bars."""
+    sizes = np.sqrt(np.nanmean(found.residuals**2, axis=1))
+    known = np.flatnonzero(np.isfinite(sizes))
+    most = max(1.0, float(sizes[known].max(initial=0.0)))
+    looks: list[block.Look | None] = ["beyond" if k in found.outliers else None for k in known]
+    kinds: list[block.Kind] = ["actuator" for _ in known]
+    return block.Table(
+        "Residuals by pose",
+        (
+            block.Names("pose", [str(1 + k) for k in known]),
+            block.Column("residual", sizes[known].tolist(), "σ", DIGITS),
+            block.Bars((sizes[known] / most).tolist(), kinds),
+        ),
+        "Root mean squares, in standard deviations of what was measured; 1 is expected.",
+        looks,
     )
 
 

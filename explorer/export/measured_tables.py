@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.calibration.measured import Kind, Measured
+from explorer.errors import InputError
 from explorer.export.pose_tables import (
     SIGMA,
     TARGETS,
@@ -51,3 +52,38 @@ def kind_of(table: PoseTable) -> Kind:
         if name in table.columns:
             return kind
     return "poses"
+
+
+def setup_of(
+    design: Design,
+    kind: Kind,
+    targets: PoseTable | None,
+    sigma_mm: float,
+    sigma_deg: float,
+    base: FloatArray | None = None,
+) -> Measured:
+    """Return the setup of a measurement, without values, whose points are about right.
+
+    The table has points of the platform; of bar and gauge the tool is one. The base has the ball
+    (1, 3), or planes (p, 4): normals of any length, and distances.
+
+    Raises:
+        InputError: A normal is zero, or targets have no table.
+    """
+    points, lengths = np.array([design.tool.position]), np.full(3, sigma_mm / design.unit_mm)
+    if targets is not None:
+        points = targets.numbers(*"xyz")[:3]
+    elif kind == "targets":
+        raise InputError("targets need a table of where they are (--targets): columns x, y, z")
+    base = np.zeros((0, 3)) if base is None else base
+    if kind == "gauge":
+        sizes = np.linalg.norm(base[:, :3], axis=1, keepdims=True)
+        if not sizes.all():
+            raise InputError("the normal of a plane must not be all zeros")
+        base = np.hstack([base[:, :3] / sizes, base[:, 3:]])
+    if kind == "poses":
+        sigma = np.concatenate([lengths, np.full(3, np.radians(sigma_deg))])
+        return Measured(kind, np.empty((0, 6)), sigma)
+    return Measured(
+        kind, np.empty((0, 1)), lengths[0], points, base=base, plane=np.arange(len(base) or 1)
+    )

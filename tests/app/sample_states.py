@@ -10,6 +10,7 @@ from typing import Any, TypeVar, cast, get_args, get_type_hints
 import msgspec
 from hypothesis import strategies as st
 
+from explorer.app.features.calibration.feature import Calibrated
 from explorer.app.features.compare.feature import Pin, Unpin
 from explorer.app.features.compare.state import CompareView
 from explorer.app.features.optimise.actions import (
@@ -272,6 +273,7 @@ def rich_state() -> State:
         Pin(OPTIMAL),
         Change("compared", {"look": varied(CompareView())}),
         Set("studies", varied(Studies())),
+        Set("calibrated", Calibrated("l1;é\n1", "x,y,z\n", 1 / 3, 1 / 7)),
         Set("required", Required(msgspec.structs.replace(EXAMPLE, tilt_deg=1 / 3), True)),
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),

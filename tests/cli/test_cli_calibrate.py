@@ -151,9 +151,15 @@ def test_column_of_sigma_counts_in_place_of_the_option(cli: CommandLine, tmp_pat
     ("argv", "words"),
     [
         ((), "give either --measured FILE.csv, or the word poses"),
-        (("poses", "--measure", "targets"), "--targets FILE.csv says, with the columns x, y, z"),
+        (
+            ("poses", "--measure", "targets"),
+            "targets need a table of where they are (--targets): columns x, y, z",
+        ),
         (("poses", "--measure", "bar"), "--ball X Y Z says about where"),
-        (("poses", "--measure", "gauge", "--planes", "0", "0", "0", "1"), "normal must not be all"),
+        (
+            ("poses", "--measure", "gauge", "--planes", "0", "0", "0", "1"),
+            "the normal of a plane must not be all zeros",
+        ),
         (("poses", "--planes", "0", "0", "1"), "1 to 3 planes"),
         (("poses", "--count", "0"), "must lie within 1 to 10000"),
     ],

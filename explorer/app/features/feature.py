@@ -280,8 +280,8 @@ class Feature:
         name: Name of its folder.
         manual: What the button "?" of its tabs opens in the manual, the file of a page with "#" and
             a heading of it; "" for no button. Tabs that features share have that of the first.
-        openers: Functions that open files, by a field that no other kind of file has; a file with
-            none of these fields is a design.
+        openers: Functions that open files, by a field that no other kind of file has, or by the
+            suffix of files that are no JSON; a file with none of these fields is a design.
         feeds: Feeds, which request drawings from the process of the page; `FeedOf` declares one.
         later_feeds: Feeds whose requests come after those of all features' `feeds`, since nobody
             waits for their results while the scene changes.

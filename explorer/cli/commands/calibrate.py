@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -20,7 +20,7 @@ from explorer.calibration.words import calibration_blocks
 from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import pose_tables
-from explorer.export.measured_tables import kind_of, read_measured
+from explorer.export.measured_tables import kind_of, read_measured, setup_of
 from explorer.files.writing import check_writable, write_whole
 from explorer.mechanism.design import Design
 
@@ -113,30 +113,15 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
 
     def _setup(self, design: Design, kind: Kind) -> Measured:
         """Return the setup of a kind of measurement, without values."""
-        if kind == "targets" and self.targets is None:
-            raise InputError("targets are where --targets FILE.csv says, with the columns x, y, z")
         if kind == "bar" and self.ball is None:
             raise InputError("--ball X Y Z says about where the ball of the base is")
-        points = np.array([design.tool.position])
-        if self.targets is not None:
-            points = pose_tables.read_table(self.targets, design.unit_mm).numbers(*"xyz")[:3]
-        balls, planes = np.array([self.ball or ()]), np.reshape(self.planes or (), (-1, 4))
-        sizes = np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
-        if not sizes.all():
-            raise InputError("--planes NX NY NZ DISTANCE: a normal must not be all zeros")
-        planes[:, :3] /= sizes
-        lengths = np.full(3, self.sigma / design.unit_mm)
-        return Measured(
-            kind,
-            np.empty((0, 1)),
-            np.array([*lengths, *np.radians([self.sigma_deg] * 3)])
-            if kind == "poses"
-            else lengths[0],
-            np.zeros((1, 3)) if kind == "poses" else points,
+        targets = self.targets and pose_tables.read_table(self.targets, design.unit_mm)
+        base = {"bar": np.array([self.ball or ()]), "gauge": np.reshape(self.planes or (), (-1, 4))}
+        setup = setup_of(design, kind, targets, self.sigma, self.sigma_deg, base.get(kind))
+        return replace(
+            setup,
             points_known=self.known,
             in_base=not self.other_frame or kind in ("bar", "gauge"),
-            base={"bar": balls, "gauge": planes}.get(kind, np.zeros((0, 3))),
-            plane=np.arange(max(1, len(planes))),
         )
 
     def _lines(self, design: Design, assumed: tuple[str, ...], found: Calibration) -> Iterator[str]:

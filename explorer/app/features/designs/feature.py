@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from html import escape
+from pathlib import Path
 
 import viser
 
@@ -123,10 +124,12 @@ class SavedDesigns:
         who = None if client is None else client.client_id
 
         def work() -> None:
-            if not data.lstrip(BEFORE_JSON).startswith(b"{"):
-                raise InputError(f"{name} is no design, study or session; these are JSON files")
             openers = {k: v for one in self._services.features for k, v in one.openers.items()}
-            fields = field_names(data)
+            is_json = data.lstrip(BEFORE_JSON).startswith(b"{")
+            suffixes = openers.keys() & {Path(name).suffix.lower()}
+            if not (is_json or suffixes):
+                raise InputError(f"{name} is no design, study or session; these are JSON files")
+            fields = field_names(data) if is_json else suffixes
             opener = next((openers[each] for each in openers if each in fields), open_design)
             action, words = opener(self._services, data, name)
             before = self._session.latest_state()
@@ -254,9 +257,9 @@ class DesignsPanel:
             "Open a file …",
             color="gray",
             icon=viser.Icon.UPLOAD,
-            mime_type="application/json",
-            hint="A design, a study or a session (JSON) from this computer; or drop it anywhere on "
-            "the page.",
+            mime_type="application/json,text/csv",
+            hint="A design, a study or a session (JSON), or what was measured of a machine (CSV), "
+            "from this computer; or drop it anywhere on the page.",
         )
         run_script(services.server, read_script("files", element_id(upload)))
 

@@ -1,0 +1,133 @@
+"""*Calibration*: a table of what was measured is dropped, and the machine is told and saved."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from explorer.app.features.feature import Feature, Services, Tab, html_of
+from explorer.app.inputs.controls import Controls
+from explorer.app.session.feed import FeedOf
+from explorer.app.session.session import Who
+from explorer.app.state.actions import Action, Set
+from explorer.app.state.frame import Frame
+from explorer.app.state.parts import FeaturePart
+from explorer.app.widgets.blocks import render
+from explorer.app.widgets.markup import box, dim
+from explorer.calibration.identify import Calibration, calibrate
+from explorer.calibration.machine_file import encode_machine
+from explorer.calibration.words import calibration_blocks
+from explorer.errors import InputError
+from explorer.export.measured_tables import kind_of, read_measured, setup_of
+from explorer.export.pose_tables import parse_table
+from explorer.files.json_text import decode_text
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import typical_machine
+from explorer.page.widgets.assigning import Update
+
+DROP = "Drop a table of joints and of what was measured there on the page (CSV)."
+NAMES = {"measured": "Measured table", "targets": "Places of the targets"}
+
+
+@dataclass(frozen=True)
+class Calibrated(FeaturePart, name="calibrated"):
+    """What was measured of a machine, as text of tables, "" for none, and how well it is known.
+
+    Attributes:
+        sigma: Standard deviation of measured lengths, in millimetres.
+        sigma_turn: Standard deviation of measured turns, in degrees.
+    """
+
+    measured: str = ""
+    targets: str = ""
+    sigma: float = 0.01
+    sigma_turn: float = 0.005
+
+    def on_open(self) -> Calibrated:
+        """Return the part for another design, of which nothing was measured."""
+        return replace(self, measured="")
+
+
+def calibrate_table(request: tuple[Design, Calibrated]) -> Calibration:
+    """Return the machine of a design in tables; tolerances that it does not state are typical."""
+    design, part = typical_machine(request[0])[0], request[1]
+    table = parse_table(NAMES["measured"], part.measured.encode(), design.unit_mm)
+    targets = None
+    if part.targets:
+        targets = parse_table(NAMES["targets"], part.targets.encode(), design.unit_mm)
+    kind = kind_of(table)
+    if kind in ("bar", "gauge"):
+        raise InputError("of bars and gauges explorer calibrate takes the setup, not the page")
+    setup = setup_of(design, kind, targets, part.sigma, part.sigma_turn)
+    return calibrate(design, *read_measured(table, design, setup))
+
+
+def _request_for(frame: Frame) -> tuple[Design, Calibrated] | None:
+    part = Calibrated.of(frame.state)
+    return (frame.state.design, part) if part.measured else None
+
+
+CALIBRATION_FEED = FeedOf(calibrate_table, _request_for, process="calibrate", in_scene=False)
+
+
+class CalibrationPanel:
+    """How well lengths and turns are known, what the table tells of the machine, and its file."""
+
+    def __init__(self, services: Services) -> None:
+        gui, self._services = services.gui, services
+        self._feed, self._controls = services.get(CALIBRATION_FEED), Controls(services)
+        with self._controls.folder("Calibration", is_open=False):
+            for label, field, step, of in (
+                ("Lengths within σ (mm)", "sigma", 0.001, "lengths"),
+                ("Turns within σ (°)", "sigma_turn", 0.001, "turns of the platform"),
+            ):
+                hint = f"Standard deviation of measured {of}, where the table states none."
+                self._controls.number(label, hint, f"calibrated.{field}", least=1e-6, step=step)
+            self._result = gui.add_html("")
+            hint = "Download the machine, for --machine of the explorer's commands."
+            self._download = gui.add_button("Download machine", hint=hint, color=None)
+            self._download.on_click(lambda event: self._send(event.client_id))
+            services.commands.offer(self._download, lambda client: self._send(client.client_id))
+            self._forget = self._controls.button(
+                "Forget the table",
+                "Forget what was measured; undo brings it back.",
+                lambda: Set("calibrated.measured", "", NAMES["measured"], "forgotten"),
+            )
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that tell the machine of a frame."""
+        yield from self._controls.updates(frame)
+        content, has_table = box(dim(DROP)), bool(Calibrated.of(frame.state).measured)
+        yield self._forget, "visible", has_table
+        if has_table:
+            content = html_of(
+                self._feed, lambda found: render(calibration_blocks(found)), "No machine"
+            )
+        yield self._result, "content", content
+        found = self._feed.drawing
+        yield self._download, "visible", found is not None and found.gains
+
+    def _send(self, who: Who) -> None:
+        found = self._feed.drawing
+        if found is not None and found.gains:
+            date = dt.datetime.now().astimezone().date().isoformat()
+            data = encode_machine(found.machine, found.unseen, date)
+            self._services.downloads.send(who, "machine.json", data)
+
+
+def open_table(_: Services, data: bytes, name: str) -> tuple[Action, str]:
+    """Return the action that takes a table: one without joints has the places of targets."""
+    is_measured = "l1" in parse_table(name, data, 1.0).columns
+    field = "measured" if is_measured else "targets"
+    action = Set(f"calibrated.{field}", decode_text(data, "cp1252"), NAMES[field], name)
+    return action, f"{NAMES[field]}; the tab Loads has the machine."
+
+
+CALIBRATION = Feature(
+    "calibration",
+    manual="calibration.md",
+    tabs=(Tab("analyse", "Loads", CalibrationPanel),),
+    openers={".csv": open_table},
+    later_feeds=(CALIBRATION_FEED,),
+)
