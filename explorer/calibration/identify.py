@@ -91,8 +91,10 @@ class Calibration:
 
     @property
     def worst(self) -> list[int]:
-        """The three lines of the largest residuals, from 0, the worst first."""
-        return np.argsort(-np.nansum(self.residuals**2, axis=1))[:3].tolist()
+        """The three lines of the largest residuals that are not left out, from 0."""
+        squares = np.nansum(self.residuals**2, axis=1)
+        squares[self.outliers] = 0.0
+        return np.sort(np.argsort(-squares)[:3]).tolist()
 
     @property
     def gains(self) -> bool:
@@ -103,7 +105,7 @@ class Calibration:
     def faults(self) -> list[str]:
         """What is wrong with the measurement, as sentences; none if the machine may be used."""
         few = ", ".join(name for name in self.unseen if name in SOURCES)
-        worst = ", ".join(str(1 + k) for k in sorted(self.worst))
+        worst = ", ".join(str(1 + k) for k in self.worst)
         words = {
             "nothing gained: the design tells lines better that are held out": not self.gains,
             f"too few poses, or too coarse, to see {few}": few,

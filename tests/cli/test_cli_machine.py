@@ -63,7 +63,8 @@ def test_inverse_and_forward_are_those_of_the_machine(cli: CommandLine, file: Pa
         assert_allclose(machine.inverse(mode["position"], rotation), found, atol=1e-11)
     text = cli.text("inverse", "--machine", file)
     assert f"{10.0 * found[0]:.3f}" in text
-    assert cli.text("forward", "--joints", *found, "--machine", file)
+    assert "in every mode" not in cli.text("forward", "--joints", *found, "--machine", file)
+    assert "in every mode" in cli.text("forward", "--joints", *found)
 
 
 def test_tables_have_joints_and_poses_of_the_machine(

@@ -24,6 +24,7 @@ from explorer.export.measured_tables import kind_of, read_measured, setup_of
 from explorer.files.writing import check_writable, write_whole
 from explorer.mechanism.design import Design
 
+What = Literal["machine", "poses"]
 _MEASURED, _POSES = values.hint("to identify a machine", "FILE.csv"), values.hint("with poses")
 
 
@@ -40,8 +41,8 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
     then, as the design is as good, no file is written.
     """
 
-    what: Annotated[Literal["machine", "poses"], tyro.conf.Positional] = "machine"
-    """Answer: the machine, or poses to measure."""
+    what: Annotated[What, tyro.conf.Positional, tyro.conf.arg(metavar="[WHAT]")] = "machine"
+    """Answer: machine, or poses in which to measure it."""
 
     out: Path
     """File to write: the machine (JSON), or the poses (CSV)."""
