@@ -107,7 +107,7 @@ class Calibration:
         few = ", ".join(name for name in self.unseen if name in SOURCES)
         worst = ", ".join(str(1 + k) for k in self.worst)
         words = {
-            "nothing gained: the design tells lines better that are held out": not self.gains,
+            "nothing gained: the design predicts poses held out better": not self.gains,
             f"too few poses, or too coarse, to see {few}": few,
             f"χ² is {self.excess:.1f}σ above its expectation, most in poses {worst}": (
                 self.excess > MOST_EXCESS

@@ -106,7 +106,7 @@ def test_panel_tells_the_machine_and_sends_its_file(
     feed.follow(Frame(desk.state))
     jobs.work()
     content = markup_of(panel, desk.state)
-    for words in ("30 of 31 seen", "cannot be told from the guide", "Residuals by pose"):
+    for words in ("30 of 31 seen", "cannot be told from the guide", "Residuals by pose", "Assumed"):
         assert words in content
     controls = controls_of(page, panel, desk.state)
     assert controls["Download machine"].visible

@@ -101,9 +101,12 @@ class CalibrationPanel:
         content, has_table = box(dim(DROP)), bool(Calibrated.of(frame.state).measured)
         yield self._forget, "visible", has_table
         if has_table:
-            content = html_of(
+            told = html_of(
                 self._feed, lambda found: render(calibration_blocks(found)), "No machine"
             )
+            assumed = "; ".join(typical_machine(frame.state.design)[1])
+            note = dim(f"Assumed, since the design states none: {assumed}.")
+            content = f"{told}{box(note) if assumed else ''}"
         yield self._result, "content", content
         found = self._feed.drawing
         yield self._download, "visible", found is not None and found.gains
