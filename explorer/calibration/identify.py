@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from explorer.calibration.measured import Measured
+from explorer.calibration.measured import Measured, mean_squares
 from explorer.calibration.poses import sample_poses
 from explorer.calibration.unseen import unseen_of
 from explorer.errors import InputError, NoAnswerError
@@ -261,7 +261,7 @@ class _Problem:
                 found = replace(self, spread=spread)
                 there = replace(found, measured=rest).settle(state, "linear", SETTLED)
                 off = found.lines(there)[0][out]
-                row[0, out] = np.nanmean(off**2, axis=1)
+                row[0, out] = mean_squares(off)
                 row[1, out] = self.measured.square_distances(off * sigma[out])
         told = np.isfinite(squares).all(axis=(0, 1))
         return np.sqrt(squares[..., told].sum(axis=-1) / max(1, int(told.sum())))

@@ -119,7 +119,7 @@ class Measured:
     def square_distances(self, off: FloatArray) -> FloatArray:
         """Return mean squares of the distances in residuals (n, m) of values, shape (n,)."""
         lengths = off[:, :3] if self.kind == "poses" else off
-        return np.nanmean(lengths**2, axis=1) * min(3, lengths.shape[1])
+        return mean_squares(lengths) * min(3, lengths.shape[1])
 
     def align(self, position: FloatArray, rotation: FloatArray) -> Measured:
         """Return values in the frame that fits best if the base's are of these poses."""
@@ -135,3 +135,9 @@ class Measured:
             vectors = (turn * Rotation.from_rotvec(np.nan_to_num(self.values[:, 3:]))).as_rotvec()
             values = np.concatenate([values, vectors + 0.0 * self.values[:, 3:]], axis=1)
         return replace(self, values=values)
+
+
+def mean_squares(values: FloatArray) -> FloatArray:
+    """Return the mean squares of rows (n, m), shape (n,); NaN for those without a number."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.nansum(values**2, axis=1) / np.isfinite(values).sum(axis=1))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.calibration.identify import Calibration
+from explorer.calibration.measured import mean_squares
 from explorer.measures.blocks import block
 from explorer.numerics.arrays import lengths_of
 from explorer.statics.accuracy import SOURCES, UNITS, drawing_values
@@ -69,7 +70,7 @@ def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
 
 def _residuals(found: Calibration) -> block.Table:
     """Return what the machine leaves of each pose, as numbers and as bars."""
-    sizes = np.sqrt(np.nanmean(found.residuals**2, axis=1))
+    sizes = np.sqrt(mean_squares(found.residuals))
     known = np.flatnonzero(np.isfinite(sizes))
     most = max(1.0, float(sizes[known].max(initial=0.0)))
     looks: list[block.Look | None] = ["beyond" if k in found.outliers else None for k in known]
