@@ -79,8 +79,8 @@ class CalibrationPanel:
         self._feed, self._controls = services.get(CALIBRATION_FEED), Controls(services)
         with self._controls.folder("Calibration", is_open=False):
             for label, field, step, of in (
-                ("Lengths within σ (mm)", "sigma", 0.001, "lengths"),
-                ("Turns within σ (°)", "sigma_turn", 0.001, "turns of the platform"),
+                ("σ of lengths (mm)", "sigma", 0.001, "lengths"),
+                ("σ of turns (°)", "sigma_turn", 0.001, "turns of the platform"),
             ):
                 hint = f"Standard deviation of measured {of}, where the table states none."
                 self._controls.number(label, hint, f"calibrated.{field}", least=1e-6, step=step)
