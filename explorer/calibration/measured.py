@@ -9,9 +9,11 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
+from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray, dot, finite_array, lengths_of
 
 Kind = Literal["poses", "targets", "bar", "gauge"]
@@ -135,6 +137,54 @@ class Measured:
             vectors = (turn * Rotation.from_rotvec(np.nan_to_num(self.values[:, 3:]))).as_rotvec()
             values = np.concatenate([values, vectors + 0.0 * self.values[:, 3:]], axis=1)
         return replace(self, values=values)
+
+
+def setup_of(
+    design: Design,
+    kind: Kind,
+    points: ArrayLike | None = None,
+    sigma_mm: float = 0.01,
+    sigma_deg: float = 0.005,
+    base: ArrayLike | None = None,
+) -> Measured:
+    """Return the setup of a measurement of a design, without values, as far as it is known.
+
+    Args:
+        design: The manipulator.
+        kind: What is measured.
+        points: One to three targets, or the point of a bar or gauge, shape (s, 3); the tool for
+            None.
+        sigma_mm: Standard deviation of lengths.
+        sigma_deg: Standard deviation of turns.
+        base: The ball of a bar, shape (1, 3), or up to three planes of a gauge, shape (p, 4), of
+            normals of any length, and distances; the plane z = 0 for None.
+
+    Raises:
+        InputError: Targets or ball are not given, points are too many, or a normal is zero.
+    """
+    length = np.array(sigma_mm / design.unit_mm)
+    if kind == "poses":
+        return Measured(kind, np.empty((0, 6)), np.repeat([length, np.radians(sigma_deg)], 3))
+    if points is None and kind == "targets":
+        raise InputError("targets need a table of where they are (--targets): columns x, y, z")
+    if base is None and kind == "bar":
+        raise InputError("--ball X Y Z says about where the ball of the base is")
+    at = design.tool.position if points is None else points
+    places = np.atleast_2d(finite_array("points", at, (3,)))
+    if len(places) > (most := 3 if kind == "targets" else 1):
+        raise InputError(f"{kind}: points of the platform are at most {most}; got {len(places)}")
+    ends = np.zeros((0, 3))
+    if kind == "bar":
+        ends = np.atleast_2d(finite_array("ball", base, (3,)))
+    elif kind == "gauge":
+        planes = (0.0, 0.0, 1.0, 0.0) if base is None else base
+        ends = np.atleast_2d(finite_array("planes", planes, (4,)))
+        sizes = lengths_of(ends[:, :3])[:, None]
+        if not sizes.all():
+            raise InputError("the normal of a plane must not be all zeros")
+        ends = np.hstack([ends[:, :3] / sizes, ends[:, 3:]])
+    values = np.empty((0, places.size if kind == "targets" else 1))
+    return Measured(kind, values, length, places, base=ends, plane=np.arange(len(ends)))
 
 
 def mean_squares(values: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from explorer.calibration.measured import Measured
+from explorer.calibration.measured import Kind, Measured, setup_of
 from explorer.errors import NoAnswerError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
@@ -73,7 +73,7 @@ def sample_poses(
 def calibration_poses(
     design: Design,
     count: int,
-    measured: Measured,
+    kind: Kind | Measured,
     tolerances: ArrayLike | None = None,
     seed: int = 0,
 ) -> Configuration:
@@ -82,14 +82,15 @@ def calibration_poses(
     Args:
         design: The manipulator.
         count: Number of poses.
-        measured: Kind and setup of the measurement, and its deviations; values do not count.
+        kind: What is measured, or a setup with its deviations, whose values do not count.
         tolerances: Largest deviations, shape (31,), in mm and degrees; those of the design if None.
         seed: Seed of the random candidates.
 
     Raises:
-        InputError: The number of poses or a tolerance is not usable.
+        InputError: The number of poses or a tolerance is not usable, or the kind needs a setup.
         NoAnswerError: Too few poses within the limits are fit to be measured.
     """
+    measured = setup_of(design, kind) if isinstance(kind, str) else kind
     most = max(CANDIDATES, whole("the number of poses", count, 1, 10_000))
     found = sample_poses(design, most, tolerances, seed)
     if len(found.positions) < count:

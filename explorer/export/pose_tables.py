@@ -118,8 +118,10 @@ class PoseTable:
         """The number of the line in the file of each row."""
         return [line for line, _ in self.rows]
 
-    def numbers(self, *names: str) -> FloatArray:
+    def numbers(self, *names: str, blank: float | None = None) -> FloatArray:
         """Return columns as numbers, shape (n, len(names)), in design units, degrees or seconds.
+
+        Blank cells are the number that is given for them; None if they are faults.
 
         Raises:
             InputError: A column is missing, or a cell is no finite number; the message has its
@@ -138,6 +140,9 @@ class PoseTable:
         signs = str.maketrans(",.", ".,") if self.decimal == "," else {}
         for index, (_, cells) in enumerate(self.rows):
             for k, (place, _, factor) in enumerate(columns):
+                if blank is not None and not cells[place].strip():
+                    values[index, k] = blank
+                    continue
                 try:
                     value = factor * float(cells[place].translate(signs))
                 except ValueError:

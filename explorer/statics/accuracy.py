@@ -69,8 +69,13 @@ def worst_error(
 def pose_error_by_geometry(
     design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
 ) -> FloatArray:
-    """Return `error_by_geometry` of `Configuration(design, position, rotation, tool)`."""
-    return error_by_geometry(Configuration(design, position, rotation, tool))
+    """Return the tool's error per error of each point and of the guide, shape (..., 6, 23).
+
+    These are the first columns of `error_by_geometry` of `Configuration(design, position, rotation,
+    tool)`; the two others are those of the struts.
+    """
+    by_geometry = error_by_geometry(Configuration(design, position, rotation, tool))
+    return by_geometry[..., : STRUTS.start]
 
 
 def worst_errors(configuration: Configuration, errors: ArrayLike) -> ToolError:
@@ -103,8 +108,7 @@ def error_by_geometry(configuration: Configuration) -> FloatArray:
     values. Columns have the order of `explorer.mechanism.machine.DIMENSIONS`: a1, a3 and the
     guide's offset along base axes, the guide's tilt about y and z through a1, b1 to b4 along
     platform axes, and the tilts of struts 2 and 3 along the guide. Offsets are in design units,
-    tilts in radians. All entries are infinite in a
-    singular pose.
+    tilts in radians. All entries are infinite in a singular pose.
     """
     c, twists = configuration, twists_of_actuators(configuration)
     rows, b = c.jacobian[..., :3], c.points

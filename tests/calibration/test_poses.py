@@ -28,6 +28,7 @@ from explorer import (
     calibration_poses,
     poses_are_valid,
 )
+from explorer.calibration.measured import setup_of
 from explorer.calibration.poses import sample_poses
 from explorer.statics.accuracy import stated_tolerances
 
@@ -45,6 +46,16 @@ def test_sampled_poses_are_within_limits_and_let_every_machine_close() -> None:
     rough = sample_poses(TYPICAL, 300, 3.0 * stated_tolerances(TYPICAL), seed=4)
     assert np.abs(rough.margins).min() > 2.0 * np.abs(poses.margins).min()
     assert (sample_poses(TYPICAL, 300, seed=4).position == poses.position).all()
+
+
+def test_setup_may_be_left_out_where_it_says_nothing() -> None:
+    chosen = calibration_poses(TYPICAL, 6, POSES)
+    assert (calibration_poses(TYPICAL, 6, "poses").position == chosen.position).all()
+    assert len(calibration_poses(TYPICAL, 6, "gauge").position) == 6
+    targets, bar = (refusal(calibration_poses, TYPICAL, 6, kind) for kind in ("targets", "bar"))
+    assert "targets need a table of where they are" in targets
+    assert "where the ball of the base is" in bar
+    assert "at most 3; got 4" in refusal(setup_of, TYPICAL, "targets", np.eye(4, 3))
 
 
 def test_eight_chosen_poses_are_better_than_eight_random_ones() -> None:

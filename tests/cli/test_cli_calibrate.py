@@ -109,6 +109,26 @@ def test_poses_are_written_and_the_machine_found_there(
     assert "a1 beside the guide" in text
 
 
+def test_targets_that_were_hidden_are_blank(cli: CommandLine, tmp_path: Path) -> None:
+    poses, out, points = tmp_path / "poses.csv", tmp_path / "machine.json", write_points(tmp_path)
+    setup = ("--typical", "--targets", points)
+    argv = ("calibrate", "poses", "--measure", "targets", "--count", 20, "--out", poses)
+    cli.run(*argv, *setup)
+    given = measure(poses, TARGETS)
+    head, *lines = given.read_text().splitlines()
+    cells = [line.split(",") for line in lines]
+    for k, row in enumerate(cells):
+        row[6 + 3 * (k % 3) : 9 + 3 * (k % 3)] = ["", " ", ""]
+    given.write_text("\n".join([head, *(",".join(row) for row in cells)]))
+    found = cli.answer("calibrate", "--measured", given, "--out", out, *setup)
+    assert found["degrees"] == 20 * 6 - 9
+    assert 10.0 * found["tool_after_mm"] < found["tool_before_mm"]
+    cells[2][0] = ""
+    given.write_text("\n".join([head, *(",".join(row) for row in cells)]))
+    _, error = cli.run("calibrate", "--measured", given, "--out", out, *setup, status=2)
+    assert "line 4, column l1_mm" in error
+
+
 def test_wrong_poses_are_named_from_one(cli: CommandLine, tmp_path: Path) -> None:
     poses, out = tmp_path / "poses.csv", tmp_path / "machine.json"
     cli.run("calibrate", "poses", "--count", 20, "--typical", "--out", poses)

@@ -14,13 +14,13 @@ import tyro
 
 from explorer.calibration.identify import Calibration, calibrate
 from explorer.calibration.machine_file import encode_machine
-from explorer.calibration.measured import Kind, Measured
+from explorer.calibration.measured import Kind, Measured, setup_of
 from explorer.calibration.poses import calibration_poses
 from explorer.calibration.words import calibration_blocks
 from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import pose_tables
-from explorer.export.measured_tables import kind_of, read_measured, setup_of
+from explorer.export.measured_tables import kind_of, read_measured
 from explorer.files.writing import check_writable, write_whole
 from explorer.mechanism.design import Design
 
@@ -69,7 +69,7 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
     ball: Annotated[values.Position, values.hint("bar")] = None
     """About where the ball of the base is, in design units."""
 
-    planes: Annotated[values.Planes, values.hint("gauge; default: 0 0 1 0")] = (0.0, 0.0, 1.0, 0.0)
+    planes: Annotated[values.Planes, values.hint("gauge; default: 0 0 1 0")] = None
     """About where the planes are, in the base frame: normals, and distances in design units."""
 
     sigma: Annotated[float, values.POSITIVE] = 0.01
@@ -114,11 +114,12 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
 
     def _setup(self, design: Design, kind: Kind) -> Measured:
         """Return the setup of a kind of measurement, without values."""
-        if kind == "bar" and self.ball is None:
-            raise InputError("--ball X Y Z says about where the ball of the base is")
-        targets = self.targets and pose_tables.read_table(self.targets, design.unit_mm)
-        base = {"bar": np.array([self.ball or ()]), "gauge": np.reshape(self.planes or (), (-1, 4))}
-        setup = setup_of(design, kind, targets, self.sigma, self.sigma_deg, base.get(kind))
+        points = None
+        if self.targets is not None:
+            points = pose_tables.read_table(self.targets, design.unit_mm).numbers(*"xyz")
+        base = None if self.planes is None else np.reshape(self.planes, (-1, 4))
+        base = self.ball if kind == "bar" else base
+        setup = setup_of(design, kind, points, self.sigma, self.sigma_deg, base)
         return replace(
             setup,
             points_known=self.known,

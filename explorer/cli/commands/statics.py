@@ -19,7 +19,7 @@ from explorer.measures.box import PositionSet, positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import encode_design
-from explorer.mechanism.machine import DIMENSIONS, Six
+from explorer.mechanism.machine import DIMENSIONS, STRUTS, Six
 from explorer.mechanism.margins import INCIDENCES, SINGULAR, margins
 from explorer.mechanism.pose import Pose, Triple
 from explorer.motion.inverse_jacobian import twists_of_actuators
@@ -215,7 +215,7 @@ def _accuracy_json(found: loaded.ToolPrecision) -> dict[str, object]:
         "displacement_by_actuator": alone.displacement[loaded.BY_ACTUATORS],
         "turn_by_actuator": alone.turn[loaded.BY_ACTUATORS],
         "dimensions": list(DIMENSIONS),
-        "pose_error_by_geometry": accuracy.error_by_geometry(found.loaded),
+        "pose_error_by_geometry": accuracy.error_by_geometry(found.loaded)[:, : STRUTS.start],
         "displacement_by_geometry": alone.displacement[loaded.BY_DIMENSIONS],
         "turn_by_geometry": alone.turn[loaded.BY_DIMENSIONS],
     }

@@ -17,9 +17,10 @@ from explorer.app.widgets.blocks import render
 from explorer.app.widgets.markup import box, dim
 from explorer.calibration.identify import Calibration, calibrate
 from explorer.calibration.machine_file import encode_machine
+from explorer.calibration.measured import setup_of
 from explorer.calibration.words import calibration_blocks
 from explorer.errors import InputError
-from explorer.export.measured_tables import kind_of, read_measured, setup_of
+from explorer.export.measured_tables import kind_of, read_measured
 from explorer.export.pose_tables import parse_table
 from explorer.files.json_text import decode_text
 from explorer.mechanism.design import Design
@@ -53,13 +54,14 @@ def calibrate_table(request: tuple[Design, Calibrated]) -> Calibration:
     """Return the machine of a design in tables; tolerances that it does not state are typical."""
     design, part = typical_machine(request[0])[0], request[1]
     table = parse_table(NAMES["measured"], part.measured.encode(), design.unit_mm)
-    targets = None
+    points = None
     if part.targets:
-        targets = parse_table(NAMES["targets"], part.targets.encode(), design.unit_mm)
+        places = parse_table(NAMES["targets"], part.targets.encode(), design.unit_mm)
+        points = places.numbers(*"xyz")
     kind = kind_of(table)
     if kind in ("bar", "gauge"):
         raise InputError("of bars and gauges explorer calibrate takes the setup, not the page")
-    setup = setup_of(design, kind, targets, part.sigma, part.sigma_turn)
+    setup = setup_of(design, kind, points, part.sigma, part.sigma_turn)
     return calibrate(design, *read_measured(table, design, setup))
 
 
