@@ -167,14 +167,14 @@ def setup_of(
         return Measured(kind, np.empty((0, 6)), np.repeat([length, np.radians(sigma_deg)], 3))
     if points is None and kind == "targets":
         raise InputError("targets need a table of where they are (--targets): columns x, y, z")
-    if base is None and kind == "bar":
-        raise InputError("--ball X Y Z says about where the ball of the base is")
     at = design.tool.position if points is None else points
     places = np.atleast_2d(finite_array("points", at, (3,)))
     if len(places) > (most := 3 if kind == "targets" else 1):
         raise InputError(f"{kind}: points of the platform are at most {most}; got {len(places)}")
     ends = np.zeros((0, 3))
     if kind == "bar":
+        if base is None:
+            raise InputError("--ball X Y Z says about where the ball of the base is")
         ends = np.atleast_2d(finite_array("ball", base, (3,)))
     elif kind == "gauge":
         planes = (0.0, 0.0, 1.0, 0.0) if base is None else base

@@ -72,15 +72,16 @@ def _residuals(found: Calibration) -> block.Table:
     """Return what the machine leaves of each pose, as numbers and as bars."""
     sizes = np.sqrt(mean_squares(found.residuals))
     known = np.flatnonzero(np.isfinite(sizes))
-    most = max(1.0, float(sizes[known].max(initial=0.0)))
-    looks: list[block.Look | None] = ["beyond" if k in found.outliers else None for k in known]
+    left_out = np.isin(known, found.outliers)
+    most = max(1.0, float(sizes[known[~left_out]].max(initial=0.0)))
+    looks: list[block.Look | None] = ["beyond" if out else None for out in left_out]
     kinds: list[block.Kind] = ["actuator" for _ in known]
     return block.Table(
         "Residuals by pose",
         (
             block.Names("pose", [str(1 + k) for k in known]),
             block.Column("residual", sizes[known].tolist(), "σ", DIGITS),
-            block.Bars((sizes[known] / most).tolist(), kinds),
+            block.Bars(np.minimum(sizes[known] / most, 1.0).tolist(), kinds),
         ),
         "Root mean squares, in standard deviations of what was measured; 1 is expected.",
         looks,

@@ -86,7 +86,6 @@ class CalibrationPanel:
             ):
                 hint = f"Standard deviation of measured {of}, where the table states none."
                 self._controls.number(label, hint, f"calibrated.{field}", least=1e-6, step=step)
-            self._result = gui.add_html("")
             hint = "Download the machine, for --machine of the explorer's commands."
             self._download = gui.add_button("Download machine", hint=hint, color=None)
             self._download.on_click(lambda event: self._send(event.client_id))
@@ -96,6 +95,7 @@ class CalibrationPanel:
                 "Forget what was measured; undo brings it back.",
                 lambda: Set("calibrated.measured", "", NAMES["measured"], "forgotten"),
             )
+            self._result = gui.add_html("")
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that tell the machine of a frame."""
