@@ -6,7 +6,7 @@ Every other name is imported from its room: `from explorer.statics.accuracy impo
 from .app.notebook import show as show
 from .calibration.identify import calibrate as calibrate
 from .calibration.machine_file import load_machine as load_machine
-from .calibration.measured import Measured as Measured
+from .calibration.measurement import Measurement as Measurement
 from .calibration.poses import calibration_poses as calibration_poses
 from .errors import (
     ExplorerError as ExplorerError,

@@ -6,6 +6,7 @@ limits may change.
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
 from pathlib import Path
 from typing import Literal
@@ -20,11 +21,11 @@ from explorer.mechanism.built_machine import BuiltMachine
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Pair, Six
 from explorer.mechanism.pose import Triple
-from explorer.statics.accuracy import IS_TILT, drawing_values
+from explorer.statics.accuracy import drawing_values, from_drawing_values
 
 
 class PointDeviations(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Deviations of points, of the base and the guide along its axes, of the platform along its."""
+    """Deviations in mm: a1, a3 and guide along base axes, b1 to b4 along platform axes."""
 
     a1: Triple
     a3: Triple
@@ -63,8 +64,8 @@ class MachineFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     unseen: tuple[str, ...] = ()
 
 
-def encode_machine(machine: BuiltMachine, unseen: tuple[str, ...], date: str) -> bytes:
-    """Return a machine as indented JSON, which `decode_machine` reads back."""
+def encode_machine(machine: BuiltMachine, unseen: tuple[str, ...]) -> bytes:
+    """Return a machine of today as indented JSON, which `decode_machine` reads back."""
     design = machine.design
     values = drawing_values(design, machine.deviations).tolist()
     # The zeros, a1, a3 and the guide, its tilt, b1 to b4, and the struts.
@@ -72,7 +73,7 @@ def encode_machine(machine: BuiltMachine, unseen: tuple[str, ...], date: str) ->
     file = MachineFile(
         design=design.name,
         design_sha256=_hash(design),
-        date=date,
+        date=dt.date.today().isoformat(),
         zeros_mm=tuple(values[:6]),
         deviations_mm=PointDeviations(*points),
         guide_tilt_deg=tuple(values[15:17]),
@@ -98,7 +99,7 @@ def decode_machine(data: bytes, source: str, design: Design) -> BuiltMachine:
     a1, a3, guide, *platform = msgspec.structs.astuple(file.deviations_mm)
     parts = file.zeros_mm, a1, a3, guide, file.guide_tilt_deg, *platform, file.square_deg
     values = np.concatenate(parts)
-    return BuiltMachine(design, np.where(IS_TILT, np.radians(values), values / design.unit_mm))
+    return BuiltMachine(design, from_drawing_values(design, values))
 
 
 def load_machine(path: str | Path, design: Design) -> BuiltMachine:

@@ -9,10 +9,9 @@ square of the tool's error over all candidates, for the linear model.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from explorer.calibration.measured import Kind, Measured, setup_of
+from explorer.calibration.measurement import Kind, Measurement, setup_of
 from explorer.errors import NoAnswerError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
@@ -30,9 +29,11 @@ from explorer.workspace.limits.valid_poses import poses_are_valid
 CANDIDATES = 500
 """Number of poses from which some are chosen."""
 
-CONDITION, TIMES = 0.01, 6.0
-"""Least inverse condition number of a candidate, and its least margin over a bound of the RMS error
-of the margins."""
+CONDITION = 0.01
+"""Least inverse condition number of a candidate."""
+
+MARGIN_RATIO = 6.0
+"""Least margin of a candidate, over a bound of the RMS error of its margins."""
 
 # Random poses drawn at a time, most of these times, and most rounds of exchange.
 DRAWN, TRIES, ROUNDS = 4096, 50, 20
@@ -40,16 +41,14 @@ DRAWN, TRIES, ROUNDS = 4096, 50, 20
 ROUNDING = 1e-9
 
 
-def sample_poses(
-    design: Design, count: int, tolerances: ArrayLike | None = None, seed: int = 0
-) -> Configuration:
+def sample_poses(design: Design, count: int, seed: int = 0) -> Configuration:
     """Return up to so many random poses that are fit to be measured; home alone if none is found.
 
-    The other arguments and the errors raised are those of `calibration_poses`.
+    The margins allow for the tolerances that the design states.
     """
     rng, home = np.random.default_rng(seed), design.home_pose
     low, high = design.limits.box or ((-design.reach,) * 3, (design.reach,) * 3)
-    errors = source_errors(design, tolerances)
+    errors = source_errors(design)
     positions, rotations = np.empty((0, 3)), np.empty((0, 3, 3))
     for _ in range(TRIES):
         p = rng.uniform(low, high, (DRAWN, 3))
@@ -59,7 +58,7 @@ def sample_poses(
         valid = poses_are_valid(design, p, r)
         c = Configuration(design, p[valid], r[valid])
         off = rms_of_sources(error_by_source(c), errors)
-        least = TIMES * (off.displacement + lengths_of(c.position) * off.turn)
+        least = MARGIN_RATIO * (off.displacement + lengths_of(c.position) * off.turn)
         fit = (np.abs(c.margins).min(axis=1) >= least) & (c.inverse_condition >= CONDITION)
         positions = np.concatenate([positions, c.position[fit]])[:count]
         rotations = np.concatenate([rotations, c.rotation[fit]])[:count]
@@ -73,32 +72,30 @@ def sample_poses(
 def calibration_poses(
     design: Design,
     count: int,
-    kind: Kind | Measured,
-    tolerances: ArrayLike | None = None,
+    kind: Kind | Measurement,
     seed: int = 0,
 ) -> Configuration:
-    """Return poses in which to measure a machine of a design.
+    """Choose poses in which to measure a machine of a design.
 
     Args:
-        design: The manipulator.
+        design: The manipulator, with the errors of its actuators and its tolerances.
         count: Number of poses.
         kind: What is measured, or a setup with its deviations, whose values do not count.
-        tolerances: Largest deviations, shape (31,), in mm and degrees; those of the design if None.
         seed: Seed of the random candidates.
 
     Raises:
-        InputError: The number of poses or a tolerance is not usable, or the kind needs a setup.
+        InputError: The number of poses is not usable, or the kind needs a setup.
         NoAnswerError: Too few poses within the limits are fit to be measured.
     """
     measured = setup_of(design, kind) if isinstance(kind, str) else kind
     most = max(CANDIDATES, whole("the number of poses", count, 1, 10_000))
-    found = sample_poses(design, most, tolerances, seed)
+    found = sample_poses(design, most, seed)
     if len(found.positions) < count:
         raise NoAnswerError(
             f"of {TRIES * DRAWN:,} random poses {len(found.positions)} are within the limits and "
             f"far enough from singular ones; {count} are needed"
         )
-    spread = UNIFORM * source_errors(design, tolerances)
+    spread = UNIFORM * source_errors(design)
     slopes = measured.slopes(found.position, found.rotation, np.zeros(measured.unknowns))
     # The unknowns of the setup may be anything within the reach.
     by_source = slopes[..., :6] @ (error_by_source(found) * spread)
@@ -112,7 +109,10 @@ def calibration_poses(
 
 
 def _choose(rows: FloatArray, wanted: FloatArray, count: int) -> IntArray:
-    """Return the candidates with the least trace of the wanted covariance, by rows (n, m, k)."""
+    """Return candidates, (count,), of rows (n, m, k) and wanted weights of the covariance (k, k).
+
+    Exchanges of one candidate for another do not reduce the weighted trace further.
+    """
     chosen, information, kept = np.full(count, -1), np.eye(rows.shape[2]), 0
     for step in range(count * ROUNDS):
         k = step % count

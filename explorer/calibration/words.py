@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.calibration.identify import Calibration
-from explorer.calibration.measured import mean_squares
+from explorer.calibration.measurement import mean_squares
 from explorer.measures.blocks import block
 from explorer.numerics.arrays import lengths_of
 from explorer.statics.accuracy import SOURCES, UNITS, drawing_values
@@ -17,37 +17,41 @@ DIGITS = 3
 
 def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
     """Yield the blocks that tell a calibration."""
-    machine, unit = found.machine, found.machine.design.unit_mm
+    machine = found.machine
+
+    def mm(length: float) -> block.Number:
+        return block.Number(machine.design.unit_mm * length, " mm", DIGITS)
+
     for fault in found.faults:
         yield block.Statement("", fault, "beyond")
-    before, after = (
-        block.Number(unit * each, " mm", DIGITS) for each in (found.tool_before, found.tool_after)
-    )
     if found.gains:
+        before, after = mm(found.tool_before), mm(found.tool_after)
         yield block.Statement(
             "The tool", (before, " before, ", after, " after, RMS where nothing was measured")
         )
     seen = f"{found.seen} of {found.seen + len(found.unseen)} seen"
     yield block.Statement(seen, "; ".join(unseen_words(found.unseen)))
-    a1, b4 = (unit * lengths_of(machine.defects)).tolist()
-    nominal, own = (unit * found.held_out[:, 1]).tolist()
+    a1, b4 = lengths_of(machine.defects).tolist()
     left_out = ", ".join(str(1 + k) for k in found.outliers.tolist()) or "none"
     yield block.Facts(
         "Measurement and machine",
         (
-            block.Fact("a1 beside the guide", (block.Number(a1, " mm", DIGITS),)),
-            block.Fact("b4 beside the line b2b3", (block.Number(b4, " mm", DIGITS),)),
+            block.Fact("a1 beside the guide", (mm(a1),)),
+            block.Fact("b4 beside the line b2b3", (mm(b4),)),
             block.Fact(
                 "allowance of the margins",
-                (block.Number(unit * machine.allowance, " mm", DIGITS),),
+                (mm(machine.allowance),),
                 "for both, which make no exact flags",
             ),
             block.Fact(
                 "poses held out",
-                (block.Number(own, " mm", DIGITS), " off"),
-                (block.Number(nominal, " mm", DIGITS), " by the design"),
+                (mm(found.by_machine.distance), " off"),
+                (mm(found.by_design.distance), " by the design"),
             ),
-            block.Fact("χ²", (block.Number(found.chi_square), f" of {found.degrees} expected")),
+            block.Fact(
+                "χ²",
+                (block.Number(found.chi_square), f" of {found.degrees_of_freedom} expected"),
+            ),
             block.Fact("poses left out as wrong", left_out),
         ),
     )
@@ -69,7 +73,7 @@ def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
 
 
 def _residuals(found: Calibration) -> block.Table:
-    """Return what the machine leaves of each pose, as numbers and as bars."""
+    """Return the residuals of each pose, as numbers and as bars."""
     sizes = np.sqrt(mean_squares(found.residuals))
     known = np.flatnonzero(np.isfinite(sizes))
     left_out = np.isin(known, found.outliers)

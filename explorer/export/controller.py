@@ -20,7 +20,7 @@ from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.margins import margins, mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.statics.accuracy import IS_TILT, SOURCES
+from explorer.statics.accuracy import IS_TILT
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.table import demands_of
 from explorer.workspace.limits.valid_poses import Rules
@@ -45,6 +45,7 @@ def kernel_files(design: Design, machine: BuiltMachine | None = None) -> dict[st
     They have the deviations of a machine that was built of it, if one is given.
     """
     unit, pose = design.unit_mm, design.home_pose
+    deviations = (machine or BuiltMachine(design)).deviations
     rows, axes, words = limit_rows(design)
     radii, pair_words = pair_rows(design)
     variables = [unit * value for value in design.variables]
@@ -60,7 +61,7 @@ def kernel_files(design: Design, machine: BuiltMachine | None = None) -> dict[st
         "rotation": ",\n *             ".join(map(_numbers, pose.rotation + 0.0)),
         "size": _number(max(map(abs, variables))),
         "ranges": _table(rows),
-        "deviations": _numbers(deviations_in_mm(design, machine)),
+        "deviations": _numbers(np.where(IS_TILT, deviations, unit * deviations)),
         "axes": _table(axes),
         "radii": _numbers(radii),
         "bits": "\n".join(
@@ -73,12 +74,6 @@ def kernel_files(design: Design, machine: BuiltMachine | None = None) -> dict[st
         name: Template(read_template(f"{name}.in")).substitute(fields).encode()
         for name in KERNEL_FILES
     }
-
-
-def deviations_in_mm(design: Design, machine: BuiltMachine | None) -> FloatArray:
-    """Return the deviations of a machine, zeros for None, in millimetres and radians, (31,)."""
-    deviations = np.zeros(len(SOURCES)) if machine is None else machine.deviations
-    return np.where(IS_TILT, deviations, deviations * design.unit_mm)
 
 
 def read_template(file: str) -> str:

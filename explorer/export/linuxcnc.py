@@ -14,7 +14,7 @@ import numpy as np
 
 from explorer import __version__
 from explorer.errors import NoAnswerError
-from explorer.export.controller import LIMIT_NAMES, deviations_in_mm, kernel_files, read_template
+from explorer.export.controller import LIMIT_NAMES, kernel_files, read_template
 from explorer.mechanism.built_machine import BuiltMachine
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, Design
@@ -23,7 +23,7 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding
-from explorer.statics.accuracy import IS_TILT, SOURCES, UNITS
+from explorer.statics.accuracy import IS_TILT, SOURCES, UNITS, drawing_values
 from explorer.workspace.limits.valid_poses import violations
 
 LINUXCNC_FILES = (
@@ -67,13 +67,8 @@ def linuxcnc_files(design: Design, machine: BuiltMachine | None = None) -> dict[
     world = list(map(_number, at, [*3 * [unit * design.reach], *3 * [360.0]]))
     axes, joints = axis_ranges(design), joint_ranges(design)
     linear, angular = axis_speeds(design)
-    deviations = deviations_in_mm(design, machine)
-    parameters = [
-        (name.replace(" ", "_"), unit_name, math.degrees(value) if is_tilt else value, is_tilt)
-        for name, unit_name, value, is_tilt in zip(
-            SOURCES, UNITS, deviations.tolist(), IS_TILT, strict=True
-        )
-    ]
+    deviations = drawing_values(design, (machine or BuiltMachine(design)).deviations).tolist()
+    parameters = [name.replace(" ", "_") for name in SOURCES]
     speeds, slack = 3 * [linear] + 3 * [angular], unit * design.tolerance
     fields = {
         "name": design.name,
@@ -83,11 +78,11 @@ def linuxcnc_files(design: Design, machine: BuiltMachine | None = None) -> dict[
         "names": "\n".join(f'    "{name.lower().replace("_", " ")}",' for name in LIMIT_NAMES),
         "parameters": "\n".join(
             f'param rw float {name} = {value!r} "Deviation in {unit_name}";'
-            for name, unit_name, value, _ in parameters
+            for name, unit_name, value in zip(parameters, UNITS, deviations, strict=True)
         ),
         "deviations": "\n".join(
             f"        {'DEGREE * ' if is_tilt else ''}hal->{name},"
-            for name, *_, is_tilt in parameters
+            for name, is_tilt in zip(parameters, IS_TILT, strict=True)
         ),
         "home": " ".join(world),
         "move": " ".join(map("".join, zip(AXES, world, strict=True))),

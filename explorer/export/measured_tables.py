@@ -11,13 +11,17 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from explorer.calibration.measured import Kind, Measured
+from explorer.calibration.measurement import Kind, Measurement
 from explorer.export.pose_tables import SIGMA, TARGETS, PoseTable, read_joints, read_poses
-from explorer.mechanism.design import Design
+from explorer.export.tables import length_heads
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
 
 
-def read_measured(table: PoseTable, design: Design, setup: Measured) -> tuple[FloatArray, Measured]:
+def read_measured(
+    table: PoseTable, design: Design, setup: Measurement
+) -> tuple[FloatArray, Measurement]:
     """Return the joints that were read, shape (n, 6), and what was measured, in a setup.
 
     The setup's values do not count; its standard deviations do if the table states none. Cells of
@@ -39,10 +43,15 @@ def read_measured(table: PoseTable, design: Design, setup: Measured) -> tuple[Fl
     return read_joints(table), replace(setup, values=values, sigma=sigma)
 
 
+def joints_table(poses: Configuration) -> str:
+    """Return the joints of poses (n,), as a table to which what is measured is added."""
+    head = ["line", *length_heads(JOINTS, poses.design.unit_mm)]
+    rows = (f"{1 + k},{','.join(map(repr, row))}" for k, row in enumerate(poses.joints.tolist()))
+    return "\n".join([",".join(head), *rows, ""])
+
+
 def kind_of(table: PoseTable) -> Kind:
     """Return what a table has the values of."""
-    columns: dict[str, Kind] = {"bar": "bar", "gauge": "gauge", TARGETS[0]: "targets"}
-    for name, kind in columns.items():
-        if name in table.columns:
-            return kind
-    return "poses"
+    kinds: dict[str, Kind] = {"bar": "bar", "gauge": "gauge", TARGETS[0]: "targets"}
+    there: list[Kind] = [kind for name, kind in kinds.items() if name in table.columns]
+    return there[0] if there else "poses"

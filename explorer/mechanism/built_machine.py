@@ -13,7 +13,7 @@ both, the sooner as the changes of γ are extrapolated as a geometric series.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -61,14 +61,14 @@ class BuiltMachine:
     Attributes:
         design: The manipulator.
         deviations: True less read values of the six joints, then deviations of the `DIMENSIONS`,
-            shape (31,). Lengths are in design units, angles in radians.
+            shape (31,); none by default. Lengths are in design units, angles in radians.
 
     Raises:
         InputError: The deviations are not 31 finite numbers.
     """
 
     design: Design
-    deviations: FloatArray
+    deviations: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
 
     def __post_init__(self) -> None:
         if finite_array("deviations", self.deviations, (COUNT,)).ndim != 1:
@@ -107,7 +107,7 @@ class BuiltMachine:
         return (ends - self.shifts[1]) @ self.turns[1]
 
     @cached_property
-    def platform(self) -> tuple[FloatArray, FloatArray]:
+    def b2b3_frame(self) -> tuple[FloatArray, FloatArray]:
         """Axes along b2b3 and near the platform's y, (3, 3), and b1 and b4 from b2 along them."""
         b1, b2, b3, b4 = self.points
         x = (b3 - b2) * np.sign(b3[0] - b2[0])
@@ -119,18 +119,18 @@ class BuiltMachine:
     @property
     def defects(self) -> FloatArray:
         """Places of a1 beside the guide and of b4 beside the line b2b3, shape (2, 2), in units."""
-        return np.stack([self.bases[0, 1:], self.platform[1][1, 1:]])
+        return np.stack([self.bases[0, 1:], self.b2b3_frame[1][1, 1:]])
 
     @property
     def allowance(self) -> float:
-        """Most by which a margin is not zero in singular poses, for the defects, in design units.
+        """Most by which a margin of the machine's own flags is not zero in its singular poses.
 
-        The other deviations move and change the flags, and leave them flags.
+        Without the defects the machine has exact flags, which are not where they were drawn.
         """
         return float(lengths_of(self.defects).sum())
 
-    def ends_seen(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
-        """Return b1 to b4 in n poses as the unmoved bases of their legs see them, (n, 4, 3)."""
+    def leg_ends(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return b1 to b4 in n poses in the frames of the bases of their legs, (n, 4, 3)."""
         arms = position[:, None] + self.points @ np.swapaxes(rotation, 1, 2) - self.shifts
         return np.einsum("kji,nkj->nki", self.turns, arms)
 
@@ -146,7 +146,7 @@ class BuiltMachine:
         return self._readings(p, r).reshape(*batch, 6)
 
     def _readings(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
-        ends = self.ends_seen(position, rotation)
+        ends = self.leg_ends(position, rotation)
         joints = np.empty((len(ends), 6))
         joints[:, 0] = lengths_of(ends[:, 0])
         joints[:, 5] = lengths_of(ends[:, 3] - [*self.design.a3, 0.0])
@@ -187,19 +187,18 @@ class BuiltMachine:
             found.position, found.rotation, np.asarray(found.closes.all(axis=-1))
         )
 
-    def commands(self, position: ArrayLike, rotation: ArrayLike) -> BuiltPose:
+    def nominal_commands(self, position: ArrayLike, rotation: ArrayLike) -> BuiltPose:
         """Return the poses to command a controller that knows the design alone, for true ones.
 
         Each closes if the design has a pose of the same joints in the same mode. Arguments and
         errors are those of `inverse`.
         """
-        signs, known = np.where(margins(position, rotation) > 0.0, 1, -1), np.zeros(COUNT)
-        joints = self.inverse(position, rotation)
-        return BuiltMachine(self.design, known).forward(joints, signs)
+        signs = np.where(margins(position, rotation) > 0.0, 1, -1)
+        return BuiltMachine(self.design).forward(self.inverse(position, rotation), signs)
 
     def _solve(self, joints: FloatArray, signs: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return positions and rotations, (n, 3) and (n, 3, 3), by true joints and signs (3, n)."""
-        (a1, a3), (axes, (b1, b4)), tilts = self.bases, self.platform, self.strut_tilts
+        (a1, a3), (axes, (b1, b4)), tilts = self.bases, self.b2b3_frame, self.strut_tilts
         on_x, to_a3, to_b1 = np.sign([self.design.b3 - self.design.b2, a3[1], b1[1]])
         l1, l4, lengths = joints[:, 0], joints[:, 5], joints[:, STRUT_ROWS]
         x2, x3 = (joints[:, GUIDE_ROWS] + lengths * np.sin(tilts)).T

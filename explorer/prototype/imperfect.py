@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.built_machine import BuiltMachine
-from explorer.mechanism.configuration import tool_offset
+from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins, mode_of, signs_of
@@ -68,7 +68,7 @@ class ImperfectMachine(BuiltMachine):
         """
         p, r = position_array("position", position), rotation_array(rotation)
         # Seen from its base, a leg is that of the design at another position of the platform.
-        positions = self.ends_seen(p[None], r[None])[0] - self.design.platform_points @ r.T
+        positions = self.leg_ends(p[None], r[None])[0] - self.design.platform_points @ r.T
         values = self._chains.joints(positions, r).reshape(4, 4, 3)[range(4), range(4)]
         values[1:3, 0] -= values[1:3, 2] * np.tan(self.strut_tilts)
         values[1:3, 2] /= np.cos(self.strut_tilts)
@@ -138,8 +138,6 @@ class ImperfectMachine(BuiltMachine):
             NoAnswerError: The loops do not close near home.
         """
         meant, true, tool = self.design.home_pose, self.home, self.design.tool.position
-        there, expected = (
-            np.array(pose.position) + tool_offset(pose.rotation, tool) for pose in (true, meant)
-        )
+        there, expected = (np.array(tool_position(pose, tool)) for pose in (true, meant))
         turn = Rotation.from_matrix(true.rotation @ meant.rotation.T)
         return np.concatenate([there - expected, turn.as_rotvec()])

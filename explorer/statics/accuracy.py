@@ -168,17 +168,14 @@ def stated_tolerances(design: Design) -> FloatArray:
     return np.array([*design.actuators.error_mm, *design.tolerances.stated])
 
 
-def source_errors(design: Design, stated: ArrayLike | None = None) -> FloatArray:
-    """Return the largest errors of the sources, shape (31,), in design units and radians.
+def source_errors(design: Design) -> FloatArray:
+    """Return the largest errors of the sources of a design, (31,), in design units and radians."""
+    return from_drawing_values(design, stated_tolerances(design))
 
-    They are stated as in `UNITS`; None for those of the design.
 
-    Raises:
-        InputError: They are not 31 finite numbers, or one is negative.
-    """
-    given = stated_tolerances(design) if stated is None else stated
-    errors = finite_array("tolerances", given, (len(SOURCES),), signed=False)
-    return np.where(IS_TILT, np.radians(errors), errors / design.unit_mm)
+def from_drawing_values(design: Design, values: FloatArray) -> FloatArray:
+    """Return errors in the units of `UNITS`, shape (31,), in design units and radians."""
+    return np.where(IS_TILT, np.radians(values), values / design.unit_mm)
 
 
 def drawing_values(design: Design, errors: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from measured_machines import PLACES, POSES, TARGETS, TYPICAL, Session, design_i
 from scipy.spatial.transform import Rotation
 from services import StubJobs, services_for
 
-from explorer import JOINTS, Measured
+from explorer import JOINTS, Measurement
 from explorer.app.features.calibration.feature import (
     CALIBRATION,
     CALIBRATION_FEED,
@@ -41,7 +41,7 @@ HEADS = [f"{name}_mm" for name in JOINTS]
 TABLE_OF_TARGETS = "x,y,z\n" + "\n".join(",".join(map(repr, row)) for row in PLACES.tolist())
 
 
-def table_of(kind: Measured, machine: BuiltMachine | None = None) -> str:
+def table_of(kind: Measurement, machine: BuiltMachine | None = None) -> str:
     """Return what is measured of a machine in 30 poses, as a table."""
     session = Session.of(kind, sample_poses(TYPICAL, 30, seed=3), 3, machine)
     values, heads = session.measured.values, [f"t{k}_{a}_mm" for k in (1, 2, 3) for a in "xyz"]
@@ -85,13 +85,16 @@ def test_table_that_is_dropped_is_measured_or_has_the_targets(page: Services, de
     assert Calibrated.of(desk.state).measured == table
     desk.session.do(Open(PRESETS["paper-initial"]))
     desk.session.wait_until_idle()
-    assert Calibrated.of(desk.state) == Calibrated(targets=TABLE_OF_TARGETS)
+    assert Calibrated.of(desk.state) == Calibrated()
     assert desk.complaints == []
     drop(page, "nothing", "m.csv")
+    drop(page, "time,x,y,z\n0,1,2,3\n", "path.csv")
     drop(page, table, "m.txt")
-    first, second = desk.complaints
+    first, second, third = desk.complaints
     assert "line of headings" in first
-    assert "m.txt is no design, study or session" in second
+    assert "path.csv has neither joints" in second
+    assert "m.txt is no design, study or session" in third
+    assert Calibrated.of(desk.state) == Calibrated()
     page.stop()
 
 

@@ -12,6 +12,7 @@ from measured_machines import (
     ELSEWHERE,
     GAUGE,
     MICROMETRE,
+    PLACES,
     POSES,
     TARGETS,
     TYPICAL,
@@ -31,7 +32,7 @@ from explorer import (
     PRESETS,
     BuiltMachine,
     Configuration,
-    Measured,
+    Measurement,
     NoAnswerError,
     Pose,
     calibrate,
@@ -111,7 +112,11 @@ PRECISE = replace(BAR, sigma=np.array(MICROMETRE))
         (POSES, 30, (ALONG_GUIDE,)),
         (replace(TARGETS, points_known=True), 30, (ALONG_GUIDE,)),
         (TARGETS, 30, (ALONG_GUIDE, *PLATFORM_FRAME)),
-        (replace(TARGETS, points=TARGETS.points[:1]), 40, (ALONG_GUIDE, *PLATFORM_FRAME)),
+        (
+            replace(TARGETS, values=np.zeros((0, 3)), points=PLACES[:1]),
+            40,
+            (ALONG_GUIDE, *PLATFORM_FRAME),
+        ),
         (replace(POSES, in_base=False), 30, (ALONG_GUIDE, *BASE)),
         (replace(TARGETS, in_base=False), 30, (ALONG_GUIDE, *BASE, *PLATFORM_FRAME)),
         (PRECISE, 100, (ALONG_GUIDE, *BASE, *PLATFORM_FRAME)),
@@ -120,7 +125,7 @@ PRECISE = replace(BAR, sigma=np.array(MICROMETRE))
     ],
 )
 def test_kinds_of_measurement_see_all_but_what_is_named(
-    kind: Measured, count: int, unseen: tuple[str, ...]
+    kind: Measurement, count: int, unseen: tuple[str, ...]
 ) -> None:
     poses = calibration_poses(TYPICAL, count, kind)
     if not kind.in_base:
@@ -142,7 +147,7 @@ def test_kinds_of_measurement_see_all_but_what_is_named(
 
 
 def moved_session(
-    kind: Measured,
+    kind: Measurement,
     poses: Configuration,
     machine: BuiltMachine,
     turn: FloatArray,
@@ -151,7 +156,7 @@ def moved_session(
     """Return a session measured in a frame that is moved from the base's."""
     session = Session.of(replace(kind, in_base=True), poses, 2, machine)
 
-    def move(measured: Measured) -> Measured:
+    def move(measured: Measurement) -> Measurement:
         values = measured.values.copy()
         size = values.shape[1] if kind.kind == "targets" else 3
         points = values[:, :size].reshape(len(values), -1, 3) @ turn.T + shift
@@ -196,7 +201,7 @@ def test_wrong_lines_are_found_by_their_numbers() -> None:
 
 
 @pytest.mark.parametrize("kind", [POSES, replace(TARGETS, points_known=True)])
-def test_noise_free_data_give_the_machine_but_for_what_changes_no_pose(kind: Measured) -> None:
+def test_noise_free_data_give_the_machine_but_for_what_changes_no_pose(kind: Measurement) -> None:
     session = Session.of(kind, RANDOM, 5)
     exact = replace(session.exact, sigma=1e-6 * kind.sigma)
     found = calibrate(TYPICAL, session.readings, exact).machine
@@ -206,19 +211,6 @@ def test_noise_free_data_give_the_machine_but_for_what_changes_no_pose(kind: Mea
     off[6:][GUIDE] += off[1] * found.turns[1][:, 0]
     off[[1, 3]] -= off[1]
     assert_allclose(off, 0.0, atol=1e-10)
-
-
-def test_design_without_errors_stays_nominal() -> None:
-    sessions = [Session.of(POSES, CHOSEN, seed, design_itself()) for seed in range(5)]
-    for session in sessions:
-        found = calibrate(TYPICAL, session.readings, session.measured)
-        assert (
-            np.abs(found.machine.deviations) <= 3.0 * np.sqrt(found.covariance.diagonal())
-        ).all()
-        assert rms(tool_errors(session.machine, found.machine)) < 3.0 * found.tool_after * 10.0
-    # Without an error of measurement either, nothing is found.
-    exact = calibrate(TYPICAL, sessions[0].readings, sessions[0].exact)
-    assert_allclose(exact.machine.deviations, 0.0, atol=1e-12)
 
 
 def test_moved_frame_of_measurement_changes_nothing_but_the_frame() -> None:
@@ -347,20 +339,24 @@ def test_poses_in_which_the_design_does_not_close_count_in_the_end() -> None:
     assert rms(tool_errors(machine, found.machine)) < 0.01
 
 
-def test_lines_that_cannot_close_and_values_that_are_missing_are_left_out() -> None:
-    session = Session.of(TARGETS, RANDOM, 1)
+@pytest.mark.parametrize("kind", [TARGETS, POSES, replace(POSES, in_base=False)])
+def test_poses_that_cannot_close_and_values_that_are_missing_are_left_out(
+    kind: Measurement,
+) -> None:
+    session = Session.of(kind, RANDOM, 1)
     readings, values = session.readings.copy(), session.measured.values.copy()
     readings[4, 5] += 30.0
-    values[9, 3:6] = np.nan
+    values[9, 3:] = np.nan
     values[11] = np.nan
     measured = replace(session.measured, values=values)
     found = calibrate(TYPICAL, readings, measured)
     assert found.outliers.tolist() == [4]
-    assert np.isnan(found.residuals).sum() == 9 + 3 + 9
-    assert found.degrees == 270 - 21 - 9
+    width = values.shape[1]
+    assert np.isnan(found.residuals).sum() == 3 * width - 3
+    assert found.degrees_of_freedom == 27 * width + 3 - kind.unknowns
     keep = np.setdiff1d(np.arange(30), [4, 11])
     other = calibrate(TYPICAL, readings[keep], replace(measured, values=values[keep]))
-    assert_allclose(other.machine.deviations, found.machine.deviations, atol=1e-9)
+    assert_allclose(other.machine.deviations, found.machine.deviations, atol=1e-7)
 
 
 def test_deviations_without_a_tolerance_are_zero_and_named_as_nothing() -> None:
@@ -391,7 +387,7 @@ def test_few_poses_name_what_would_have_to_be_known() -> None:
 
 
 @pytest.mark.parametrize("kind", [TARGETS, PRECISE, WALLS])
-def test_setup_may_be_stated_roughly(kind: Measured) -> None:
+def test_setup_may_be_stated_roughly(kind: Measurement) -> None:
     session = Session.of(kind, calibration_poses(TYPICAL, 100, kind), 2)
     found = calibrate(TYPICAL, session.readings, session.measured)
     rng = np.random.default_rng(0)
@@ -419,18 +415,9 @@ def test_unusable_measurements_are_refused() -> None:
     assert "must not be negative" in refusal(calibrate, *given, np.full(COUNT, -1.0))
     with pytest.raises(NoAnswerError, match="close in none of the poses"):
         calibrate(TYPICAL, 10.0 * session.readings, session.measured)
-    assert "one row for each pose" in refusal(Measured, "bar", np.zeros(3), np.array(1.0))
-    assert "must be positive" in refusal(Measured, "bar", np.zeros((3, 1)), np.array(0.0))
-
-
-def test_pose_that_was_not_measured_counts_as_none() -> None:
-    for kind in (POSES, replace(POSES, in_base=False)):
-        session = Session.of(kind, RANDOM, 1)
-        values = session.measured.values.copy()
-        values[3] = np.nan
-        found = calibrate(TYPICAL, session.readings, replace(session.measured, values=values))
-        keep = np.arange(30) != 3
-        rest = replace(session.measured, values=values[keep])
-        other = calibrate(TYPICAL, session.readings[keep], rest)
-        assert_allclose(other.machine.deviations, found.machine.deviations, atol=1e-7)
-        assert not len(found.outliers)
+    assert "one for each pose" in refusal(Measurement, "bar", np.zeros(3), np.array(1.0))
+    assert "rows of 6 numbers" in refusal(Measurement, "poses", np.zeros((3, 7)), np.array(1.0))
+    assert "for each value" in refusal(Measurement, "poses", np.zeros((3, 6)), np.ones(2))
+    one = replace(session.measured, values=session.measured.values[:1], in_base=False)
+    assert "placed by three" in refusal(calibrate, TYPICAL, session.readings[:1], one)
+    assert "must be positive" in refusal(Measurement, "bar", np.zeros((3, 1)), np.array(0.0))

@@ -22,15 +22,16 @@ from measured_machines import (
 from refusals import refusal
 
 from explorer import (
-    Measured,
+    Measurement,
     NoAnswerError,
     calibrate,
     calibration_poses,
     poses_are_valid,
 )
-from explorer.calibration.measured import setup_of
+from explorer.calibration.measurement import setup_of
 from explorer.calibration.poses import sample_poses
 from explorer.statics.accuracy import stated_tolerances
+from explorer.statics.budget import with_tolerances
 
 
 def test_sampled_poses_are_within_limits_and_let_every_machine_close() -> None:
@@ -43,7 +44,7 @@ def test_sampled_poses_are_within_limits_and_let_every_machine_close() -> None:
         machine = true_machine(np.random.default_rng(seed))
         assert machine.forward(readings).closes.all()
     # Larger tolerances ask for larger margins.
-    rough = sample_poses(TYPICAL, 300, 3.0 * stated_tolerances(TYPICAL), seed=4)
+    rough = sample_poses(with_tolerances(TYPICAL, 3.0 * stated_tolerances(TYPICAL)), 300, seed=4)
     assert np.abs(rough.margins).min() > 2.0 * np.abs(poses.margins).min()
     assert (sample_poses(TYPICAL, 300, seed=4).position == poses.position).all()
 
@@ -71,7 +72,7 @@ def test_eight_chosen_poses_are_better_than_eight_random_ones() -> None:
 
 
 @pytest.mark.parametrize("kind", [POSES, replace(TARGETS, points_known=True), WALLS])
-def test_chosen_poses_are_distinct_and_of_no_worse_trace_than_others(kind: Measured) -> None:
+def test_chosen_poses_are_distinct_and_of_no_worse_trace_than_others(kind: Measurement) -> None:
     count = 8 if kind.kind != "gauge" else 60
     poses = calibration_poses(TYPICAL, count, kind, seed=2)
     assert poses.position.shape == (count, 3)

@@ -26,7 +26,7 @@ from measured_machines import (
 )
 from scipy.spatial.transform import Rotation
 
-from explorer import JOINTS, Measured
+from explorer import JOINTS, Measurement
 from explorer.calibration.machine_file import load_machine
 from explorer.mechanism.built_machine import BuiltMachine
 from explorer.mechanism.pose import quaternion_from_rotation
@@ -46,7 +46,7 @@ def write_points(folder: Path, count: int = 3) -> Path:
 
 
 def measure(
-    poses: Path, kind: Measured, machine: BuiltMachine = TRUE, shift: tuple[float, ...] = ()
+    poses: Path, kind: Measurement, machine: BuiltMachine = TRUE, shift: tuple[float, ...] = ()
 ) -> Path:
     """Write what is measured of a machine whose encoders read the joints of a table, in mm."""
     rows = csv.DictReader(poses.read_text().splitlines())
@@ -82,7 +82,7 @@ def measure(
     ],
 )
 def test_poses_are_written_and_the_machine_found_there(
-    cli: CommandLine, tmp_path: Path, kind: Measured, count: int, options: tuple[Any, ...]
+    cli: CommandLine, tmp_path: Path, kind: Measurement, count: int, options: tuple[Any, ...]
 ) -> None:
     kind = replace(kind, sigma=kind.sigma if kind.kind in ("poses", "targets") else np.array(1e-4))
     poses, out = tmp_path / "poses.csv", tmp_path / "machine.json"
@@ -143,7 +143,7 @@ def test_machine_without_errors_gains_nothing_and_writes_no_file(
 ) -> None:
     poses, out = tmp_path / "poses.csv", tmp_path / "machine.json"
     cli.run("calibrate", "poses", "--count", 12, "--typical", "--out", poses)
-    given = measure(poses, POSES, BuiltMachine(TYPICAL, np.zeros(31)))
+    given = measure(poses, POSES, BuiltMachine(TYPICAL))
     argv = ("calibrate", "--measured", given, "--typical", "--out", out)
     found = cli.answer(*argv, status=1)
     assert found["file"] is None

@@ -26,7 +26,7 @@ MODE = 1
 def file(tmp_path: Path) -> Path:
     """Return the file of a machine of the paper's optimum."""
     file = tmp_path / "machine.json"
-    file.write_bytes(encode_machine(true_machine(np.random.default_rng(3)), (), "2024-05-31"))
+    file.write_bytes(encode_machine(true_machine(np.random.default_rng(3)), ()))
     return file
 
 

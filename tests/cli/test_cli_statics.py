@@ -147,7 +147,8 @@ def test_accuracy_json_has_errors_compliance_and_deflection(cli: CommandLine) ->
         found["pose_error_by_geometry"], explorer.pose_error_by_geometry(MACHINE, *AT), atol=1e-12
     )
     assert sum(found["deflection_shares"].values()) == pytest.approx(1.0)
-    assert len(found["dimensions"]) == len(found["displacement_by_geometry"]) == 25
+    assert len(found["dimensions"]) == len(found["displacement_by_geometry"]) == 23
+    assert len(found["displacement_by_square"]) == len(found["turn_by_square"]) == 2
 
 
 def test_accuracy_options_replace_those_of_the_design(cli: CommandLine) -> None:

@@ -9,7 +9,7 @@ from machines import OPTIMAL
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from explorer import BuiltMachine, Configuration, Design, Measured
+from explorer import BuiltMachine, Configuration, Design, Measurement
 from explorer.calibration.poses import sample_poses
 from explorer.mechanism.built_machine import COUNT
 from explorer.mechanism.design_file import typical_machine
@@ -22,11 +22,11 @@ TYPICAL = typical_machine(OPTIMAL)[0]
 MICROMETRE = 1e-4
 """A micrometre in units of 10 mm."""
 
-POSES = Measured("poses", np.zeros((0, 6)), np.repeat([10.0 * MICROMETRE, np.radians(0.005)], 3))
+POSES = Measurement("poses", np.zeros((0, 6)), np.repeat([10.0 * MICROMETRE, np.radians(0.005)], 3))
 """Whole poses, measured to 10 µm and 0.005°."""
 
 PLACES = np.array([[0.0, 0.0, 3.0], [4.0, 0.0, 3.0], [0.0, 5.0, 2.0]])
-TARGETS = Measured("targets", np.zeros((0, 9)), np.array(10.0 * MICROMETRE), PLACES)
+TARGETS = Measurement("targets", np.zeros((0, 9)), np.array(10.0 * MICROMETRE), PLACES)
 BAR = replace(
     TARGETS,
     kind="bar",
@@ -45,7 +45,7 @@ WALLS = replace(
 
 def design_itself(design: Design = TYPICAL) -> BuiltMachine:
     """Return the machine without deviations."""
-    return BuiltMachine(design, np.zeros(COUNT))
+    return BuiltMachine(design)
 
 
 def true_machine(rng: np.random.Generator, design: Design = TYPICAL) -> BuiltMachine:
@@ -53,7 +53,7 @@ def true_machine(rng: np.random.Generator, design: Design = TYPICAL) -> BuiltMac
     return BuiltMachine(design, source_errors(design) * rng.uniform(-1.0, 1.0, COUNT))
 
 
-def with_errors(measured: Measured, rng: np.random.Generator) -> Measured:
+def with_errors(measured: Measurement, rng: np.random.Generator) -> Measurement:
     """Return what is measured with random errors."""
     errors = measured.sigma * rng.normal(size=measured.values.shape)
     values = measured.values + errors
@@ -76,12 +76,12 @@ class Session:
 
     machine: BuiltMachine
     readings: FloatArray
-    exact: Measured
-    measured: Measured
+    exact: Measurement
+    measured: Measurement
 
     @staticmethod
     def of(
-        kind: Measured, poses: Configuration, seed: int, machine: BuiltMachine | None = None
+        kind: Measurement, poses: Configuration, seed: int, machine: BuiltMachine | None = None
     ) -> Session:
         """Return the session of a random machine, or of one, in poses for its design."""
         rng = np.random.default_rng(seed)

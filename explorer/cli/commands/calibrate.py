@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,13 +13,13 @@ import tyro
 
 from explorer.calibration.identify import Calibration, calibrate
 from explorer.calibration.machine_file import encode_machine
-from explorer.calibration.measured import Kind, Measured, setup_of
+from explorer.calibration.measurement import Kind, Measurement, setup_of
 from explorer.calibration.poses import calibration_poses
 from explorer.calibration.words import calibration_blocks
 from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import pose_tables
-from explorer.export.measured_tables import kind_of, read_measured
+from explorer.export.measured_tables import joints_table, kind_of, read_measured
 from explorer.files.writing import check_writable, write_whole
 from explorer.mechanism.design import Design
 
@@ -32,8 +31,8 @@ _MEASURED, _POSES = values.hint("to identify a machine", "FILE.csv"), values.hin
 class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.DesignOptions):
     """Identify the machine that was built, or choose the poses in which to measure it.
 
-    `explorer calibrate poses` writes poses with their joints. Send the machine there, add the
-    columns of what you measure, and give that table with `--measured`: bar_mm (distance of a point
+    `explorer calibrate poses` writes the joints of poses. Send the machine there, add the columns
+    of what you measure, and give that table with `--measured`: bar_mm (distance of a point
     of the platform from a ball of the base), gauge_mm (from planes, in turn), t1_x_mm to t3_z_mm
     (targets of a tracker), or else x_mm, y_mm, z_mm, qw, qx, qy, qz of the platform itself; and
     sigma_mm if lines differ. The machine's file is for `--machine` of other commands. The exit
@@ -87,9 +86,7 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
             raise InputError("give either --measured FILE.csv, or the word poses")
         if self.measured is None:
             poses = calibration_poses(design, self.count, self._setup(design, self.measure))
-            rows = [(1 + k, list[str]()) for k in range(self.count)]
-            table = pose_tables.PoseTable("", (), {}, rows, ".")
-            write_whole(self.out, pose_tables.inverse_answer(table, poses).csv.encode())
+            write_whole(self.out, joints_table(poses).encode())
             lines = [*output.assumed_lines(assumed), f"poses written to {self.out}: {self.count}"]
             self.write(lambda: {"file": self.out, "count": self.count, "assumed": assumed}, lines)
             return
@@ -97,8 +94,7 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
         found = calibrate(
             design, *read_measured(table, design, self._setup(design, kind_of(table)))
         )
-        date = dt.datetime.now().astimezone().date().isoformat()
-        data = encode_machine(found.machine, found.unseen, date)
+        data = encode_machine(found.machine, found.unseen)
         if found.gains:
             write_whole(self.out, data)
         self.write(
@@ -112,18 +108,22 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
             [NoAnswerError(fault) for fault in found.faults],
         )
 
-    def _setup(self, design: Design, kind: Kind) -> Measured:
+    def _setup(self, design: Design, kind: Kind) -> Measurement:
         """Return the setup of a kind of measurement, without values."""
         points = None
         if self.targets is not None:
             points = pose_tables.read_table(self.targets, design.unit_mm).numbers(*"xyz")
         base = None if self.planes is None else np.reshape(self.planes, (-1, 4))
         base = self.ball if kind == "bar" else base
-        setup = setup_of(design, kind, points, self.sigma, self.sigma_deg, base)
-        return replace(
-            setup,
+        return setup_of(
+            design,
+            kind,
+            points,
+            self.sigma,
+            self.sigma_deg,
+            base,
             points_known=self.known,
-            in_base=not self.other_frame or kind in ("bar", "gauge"),
+            in_base=not self.other_frame,
         )
 
     def _lines(self, design: Design, assumed: tuple[str, ...], found: Calibration) -> Iterator[str]:
@@ -137,11 +137,12 @@ def _json(found: Calibration) -> dict[str, object]:
     """Return the numbers of a calibration as plain values; poses count from 1."""
     unit = found.machine.design.unit_mm
     return {
-        **output.attributes(found, "seen unseen chi_square degrees"),
+        **output.attributes(found, "seen unseen chi_square"),
+        "degrees": found.degrees_of_freedom,
         "outliers": 1 + found.outliers,
         "tool_before_mm": unit * found.tool_before,
         "tool_after_mm": unit * found.tool_after,
-        "held_out_mm": unit * found.held_out[1, 1],
-        "held_out_by_design_mm": unit * found.held_out[0, 1],
+        "held_out_mm": unit * found.by_machine.distance,
+        "held_out_by_design_mm": unit * found.by_design.distance,
         "faults": found.faults,
     }

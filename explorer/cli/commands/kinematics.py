@@ -72,7 +72,9 @@ class InverseCommand(options.JsonOptions, options.MachineOptions, options.PoseOp
             joints = machine and machine.inverse(poses.positions, poses.rotations)
             closes = None
             if machine is not None and self.nominal_firmware:
-                position, rotation, closes = machine.commands(poses.positions, poses.rotations)
+                position, rotation, closes = machine.nominal_commands(
+                    poses.positions, poses.rotations
+                )
                 poses = Configuration(design, position, rotation)
             answer = pose_tables.inverse_answer(table, poses, self.at, joints, closes)
             _write_answer(self, files, answer)

@@ -214,10 +214,12 @@ def _accuracy_json(found: loaded.ToolPrecision) -> dict[str, object]:
         **totals,
         "displacement_by_actuator": alone.displacement[loaded.BY_ACTUATORS],
         "turn_by_actuator": alone.turn[loaded.BY_ACTUATORS],
-        "dimensions": list(DIMENSIONS),
+        "dimensions": list(DIMENSIONS[: STRUTS.start]),
         "pose_error_by_geometry": accuracy.error_by_geometry(found.loaded)[:, : STRUTS.start],
-        "displacement_by_geometry": alone.displacement[loaded.BY_DIMENSIONS],
-        "turn_by_geometry": alone.turn[loaded.BY_DIMENSIONS],
+        "displacement_by_geometry": alone.displacement[loaded.BY_DIMENSIONS][: STRUTS.start],
+        "turn_by_geometry": alone.turn[loaded.BY_DIMENSIONS][: STRUTS.start],
+        "displacement_by_square": alone.displacement[loaded.BY_DIMENSIONS][STRUTS],
+        "turn_by_square": alone.turn[loaded.BY_DIMENSIONS][STRUTS],
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -17,7 +16,7 @@ from explorer.app.widgets.blocks import render
 from explorer.app.widgets.markup import box, dim
 from explorer.calibration.identify import Calibration, calibrate
 from explorer.calibration.machine_file import encode_machine
-from explorer.calibration.measured import setup_of
+from explorer.calibration.measurement import setup_of
 from explorer.calibration.words import calibration_blocks
 from explorer.errors import InputError
 from explorer.export.measured_tables import kind_of, read_measured
@@ -47,7 +46,7 @@ class Calibrated(FeaturePart, name="calibrated"):
 
     def on_open(self) -> Calibrated:
         """Return the part for another design, of which nothing was measured."""
-        return replace(self, measured="")
+        return replace(self, measured="", targets="")
 
 
 def calibrate_table(request: tuple[Design, Calibrated]) -> Calibration:
@@ -116,15 +115,19 @@ class CalibrationPanel:
     def _send(self, who: Who) -> None:
         found = self._feed.drawing
         if found is not None and found.gains:
-            date = dt.datetime.now().astimezone().date().isoformat()
-            data = encode_machine(found.machine, found.unseen, date)
+            data = encode_machine(found.machine, found.unseen)
             self._services.downloads.send(who, "machine.json", data)
 
 
 def open_table(_: Services, data: bytes, name: str) -> tuple[Action, str]:
     """Return the action that takes a table: one without joints has the places of targets."""
-    is_measured = "l1" in parse_table(name, data, 1.0).columns
-    field = "measured" if is_measured else "targets"
+    columns = {*parse_table(name, data, 1.0).columns}
+    if "l1" not in columns and columns != {*"xyz"}:
+        raise InputError(
+            f"{name} has neither joints (l1 to l4) and what was measured of a machine, nor the "
+            "places of targets alone (x, y, z)"
+        )
+    field = "measured" if "l1" in columns else "targets"
     action = Set(f"calibrated.{field}", decode_text(data, "cp1252"), NAMES[field], name)
     return action, f"{NAMES[field]}; the tab Loads has the machine."
 

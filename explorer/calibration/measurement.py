@@ -25,10 +25,10 @@ STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Measurement:
     """What was measured in n poses, and the setup as far as it is known.
 
-    Unknowns count from what is stated here: of points, then of the frame, the ball or the planes.
+    Unknowns are added to what is stated here: of points, then of the frame, the ball or the planes.
 
     Attributes:
         kind: What is measured.
@@ -56,26 +56,37 @@ class Measured:
     plane: IntArray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
 
     def __post_init__(self) -> None:
-        if self.values.ndim != 2 or np.isinf(self.values).any():
-            raise InputError("measured values must be finite or NaN, one row for each pose")
+        columns = {"poses": 6, "targets": self.points.size}.get(self.kind, 1)
+        if self.values.shape[1:] != (columns,) or np.isinf(self.values).any():
+            raise InputError(
+                f"measured {self.kind} must be rows of {columns} numbers, finite or NaN, one for "
+                f"each pose; got the shape {self.values.shape}"
+            )
         if (finite_array("sigma", self.sigma, ()) <= 0.0).any():
             raise InputError(f"sigma must be positive; got {np.min(self.sigma):g}")
+        shape = np.shape(self.sigma)
+        if shape not in ((), (1,), (columns,), (len(self.values), 1), self.values.shape):
+            raise InputError(
+                f"sigma must be one number, one for each of {columns} columns, or one for each "
+                f"value; got the shape {shape}"
+            )
 
     @property
-    def shifts(self) -> int:
+    def point_unknowns(self) -> int:
         """Number of unknowns of the points."""
         return 0 if self.points_known or self.kind == "poses" else self.points.size
 
     @property
     def unknowns(self) -> int:
         """Number of unknowns of the setup."""
-        return self.shifts + 3 * len(self.base) + (0 if self.in_base else 6)
+        return self.point_unknowns + 3 * len(self.base) + (0 if self.in_base else 6)
 
     def model(self, position: FloatArray, rotation: FloatArray, unknowns: FloatArray) -> FloatArray:
         """Return the values in poses (n, 3) and (n, 3, 3), given unknowns (k,), shape (n, m)."""
-        shifts, off = np.zeros(self.points.size), unknowns[self.shifts :]
-        shifts[: self.shifts] = unknowns[: self.shifts]
-        places = self.points + shifts.reshape(-1, 3)
+        count, moved = self.point_unknowns, np.zeros(self.points.size)
+        moved[:count] = unknowns[:count]
+        off = unknowns[count:]
+        places = self.points + moved.reshape(-1, 3)
         points = position[:, None] + places @ np.swapaxes(rotation, 1, 2)
         if self.kind == "bar":
             return lengths_of(points - self.base - off)
@@ -83,10 +94,8 @@ class Measured:
             # Of a plane, two tilts and the distance are unknown.
             off, normals = off.reshape(-1, 1, 3), self.base[:, None, :3]
             normals = normals + off[..., :2] @ np.linalg.svd(normals)[2][:, 1:]
-            normals, distances = (
-                normals / lengths_of(normals)[..., None],
-                off[..., 2] + self.base[:, 3:],
-            )
+            normals /= lengths_of(normals)[..., None]
+            distances = off[..., 2] + self.base[:, 3:]
             plane = np.resize(self.plane, len(points))
             return dot(points, normals[plane]) - distances[plane]
         turn = np.eye(3) if self.in_base else Rotation.from_rotvec(off[:3]).as_matrix()
@@ -119,17 +128,25 @@ class Measured:
         return off
 
     def square_distances(self, off: FloatArray) -> FloatArray:
-        """Return mean squares of the distances in residuals (n, m) of values, shape (n,)."""
+        """Return mean squared distances of the points of n poses, (n,), by differences (n, m)."""
         lengths = off[:, :3] if self.kind == "poses" else off
         return mean_squares(lengths) * min(3, lengths.shape[1])
 
-    def align(self, position: FloatArray, rotation: FloatArray) -> Measured:
-        """Return values in the frame that fits best if the base's are of these poses."""
+    def align(self, position: FloatArray, rotation: FloatArray) -> Measurement:
+        """Return the measurement moved as a whole, so that its points fit those of poses best.
+
+        The poses are of shape (n, 3) and (n, 3, 3). In the base frame nothing is moved.
+
+        Raises:
+            InputError: There are fewer than three points.
+        """
         if self.in_base:
             return self
         there = self.values[:, : self.points.size].reshape(-1, 3)
         here = (position[:, None] + self.points @ np.swapaxes(rotation, 1, 2)).reshape(-1, 3)
         known = np.isfinite(there + here).all(axis=1)
+        if known.sum() < 3:
+            raise InputError("a frame of its own is placed by three measured points at least")
         middles = there[known].mean(axis=0), here[known].mean(axis=0)
         turn = Rotation.align_vectors(here[known] - middles[1], there[known] - middles[0])[0]
         values = (turn.apply(there - middles[0]) + middles[1]).reshape(len(position), -1)
@@ -146,7 +163,10 @@ def setup_of(
     sigma_mm: float = 0.01,
     sigma_deg: float = 0.005,
     base: ArrayLike | None = None,
-) -> Measured:
+    *,
+    points_known: bool = False,
+    in_base: bool = True,
+) -> Measurement:
     """Return the setup of a measurement of a design, without values, as far as it is known.
 
     Args:
@@ -158,13 +178,16 @@ def setup_of(
         sigma_deg: Standard deviation of turns.
         base: The ball of a bar, shape (1, 3), or up to three planes of a gauge, shape (p, 4), of
             normals of any length, and distances; the plane z = 0 for None.
+        points_known: Whether the points are there exactly.
+        in_base: Whether poses and targets are in the base frame, as the others always are.
 
     Raises:
         InputError: Targets or ball are not given, points are too many, or a normal is zero.
     """
     length = np.array(sigma_mm / design.unit_mm)
     if kind == "poses":
-        return Measured(kind, np.empty((0, 6)), np.repeat([length, np.radians(sigma_deg)], 3))
+        sigma = np.repeat([length, np.radians(sigma_deg)], 3)
+        return Measurement(kind, np.empty((0, 6)), sigma, in_base=in_base)
     if points is None and kind == "targets":
         raise InputError("targets need a table of where they are (--targets): columns x, y, z")
     at = design.tool.position if points is None else points
@@ -183,8 +206,16 @@ def setup_of(
         if not sizes.all():
             raise InputError("the normal of a plane must not be all zeros")
         ends = np.hstack([ends[:, :3] / sizes, ends[:, 3:]])
-    values = np.empty((0, places.size if kind == "targets" else 1))
-    return Measured(kind, values, length, places, base=ends, plane=np.arange(len(ends)))
+    return Measurement(
+        kind,
+        np.empty((0, places.size if kind == "targets" else 1)),
+        length,
+        places,
+        points_known=points_known,
+        in_base=in_base or kind != "targets",
+        base=ends,
+        plane=np.arange(len(ends)),
+    )
 
 
 def mean_squares(values: FloatArray) -> FloatArray:
