@@ -24,7 +24,7 @@ from explorer.calibration.poses import sample_poses
 from explorer.calibration.unseen import unseen_of
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.built_machine import COUNT, BuiltMachine
-from explorer.mechanism.configuration import Configuration, tool_offset
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import joint_array
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, finite_array
@@ -49,6 +49,9 @@ FOLDS = 5
 
 MOST_EXCESS = 3.0
 """Largest excess of the sum of squares, in its standard deviations, that is no fault."""
+
+CLEARLY = 2.0
+"""Least displacement of the tool by what was identified, over the error that is left."""
 
 # Sizes of the last steps of the search for wrong poses and of the last search, as shares of the
 # standard deviations of the tolerances; the most steps; a size below which they may be rounding.
@@ -83,10 +86,11 @@ class Calibration:
         unseen: Names of the others.
         residuals: Residuals over their standard deviations, shape (n, m); NaN where there are none.
         outliers: Poses that are left out: they are wrong, or their legs do not close.
-        chi_square: Sum of squares of the residuals, and of the deviations over those of tolerances.
-        degrees_of_freedom: Its expectation.
-        tool_before, tool_after: Root mean square errors of the tool over other poses, by the design
-            and by the machine, but for the frames of the measurement, in design units.
+        chi_square: Sum of squares of the residuals of poses that are not left out.
+        degrees_of_freedom: Its expectation: their number less that of what was fitted.
+        tool_moved: Root mean square by which the tool of the most likely machine is off where the
+            design has it, over other poses and but for the frames of the measurement, in units.
+        tool_after: That of its error, by the covariance.
         by_design: What the design tells of poses that were held out; the setup alone is fitted.
         by_machine: What machines of the other poses tell of them.
     """
@@ -100,7 +104,7 @@ class Calibration:
     outliers: IntArray
     chi_square: float
     degrees_of_freedom: int
-    tool_before: float
+    tool_moved: float
     tool_after: float
     by_design: HeldOut
     by_machine: HeldOut
@@ -119,9 +123,25 @@ class Calibration:
         return np.sort(np.argsort(-squares)[:3]).tolist()
 
     @property
+    def tool_before(self) -> float:
+        """Root mean square error of the tool of the design over the same poses, in units."""
+        return math.hypot(self.tool_moved, self.tool_after)
+
+    @property
     def gains(self) -> bool:
-        """Whether machines tell poses that were held out better than the design does."""
-        return self.by_machine.residual < self.by_design.residual
+        """Whether machines tell poses that were held out better than the design does.
+
+        What the tool moves must also be well above its error, lest chance decides.
+        """
+        is_better = self.by_machine.residual < self.by_design.residual
+        return is_better and self.tool_moved > CLEARLY * self.tool_after
+
+    @property
+    def beyond(self) -> list[str]:
+        """The sources whose deviations are beyond their tolerances by three standard errors."""
+        errors = np.sqrt(self.covariance.diagonal())
+        most = source_errors(self.machine.design) + 3.0 * errors
+        return [SOURCES[k] for k in np.flatnonzero(np.abs(self.machine.deviations) > most)]
 
     @property
     def faults(self) -> list[str]:
@@ -180,13 +200,11 @@ def calibrate(
         )
     places = np.where(start.closes[:, None], start.position, np.nan)
     problem = _Problem(design, joints, measured.align(places, start.rotation), spread)
-    weighting: Weighting = "linear" if loss == "linear" else "trimmed"
-    state = problem.settle(np.zeros(COUNT + measured.unknowns), "linear", ROUGH)
-    if loss == "cauchy":
-        state = problem.settle(state, "cauchy", ROUGH)
-    state = problem.settle(state, weighting, SETTLED)
+    last: Weighting = "linear" if loss == "linear" else "trimmed"
+    state = problem.settle(np.zeros(COUNT + measured.unknowns), loss, ROUGH)
+    state = problem.settle(state, last, SETTLED)
     residuals, slopes = problem.linearise(state)
-    used = weights_of(residuals, weighting) > 0.0
+    used = weights_of(residuals, last) > 0.0
     squares = residuals[used] ** 2
     # What the unknowns of the setup can explain says nothing on the machine.
     rows = slopes[used].reshape(-1, len(state))
@@ -195,44 +213,36 @@ def calibrate(
     own = rows[:, :COUNT] - setup @ (setup.T @ rows[:, :COUNT])
     information = own.T @ own
     covariance = np.asarray(np.linalg.inv(np.eye(COUNT) + information), dtype=np.float64)
-    names, frames = unseen_of(design, spread, information)
+    fitted = setup.shape[1] + float(np.trace(information @ covariance))
+    chi_square = float(np.nansum(squares))
+    degrees_of_freedom = round(float(np.isfinite(squares).sum()) - fitted)
+    # Errors of measurement that are larger than was stated.
+    covariance *= max(1.0, chi_square / max(1, degrees_of_freedom))
+    names, frames = unseen_of(design, measured, spread, information)
+    moves = _tool_slopes(design) * spread @ (np.eye(COUNT) - frames @ frames.T)
     by_design, by_machine = problem.hold_out(state, used)
-    machine = BuiltMachine(design, state[:COUNT] * spread)
-    before, after = _tool_errors(machine, spread, frames, covariance)
     found = Calibration(
-        machine=machine,
+        machine=BuiltMachine(design, state[:COUNT] * spread),
         covariance=covariance * np.outer(spread, spread),
         unknowns=state[COUNT:],
         seen=int((spread > 0.0).sum()) - len(names),
         unseen=names,
         residuals=residuals,
         outliers=np.flatnonzero(~used & np.isfinite(measured.values).any(axis=1)),
-        chi_square=float(np.nansum(squares) + (state[:COUNT] ** 2).sum()),
-        degrees_of_freedom=int(np.isfinite(squares).sum()) - setup.shape[1],
-        tool_before=before,
-        tool_after=after,
+        chi_square=chi_square,
+        degrees_of_freedom=degrees_of_freedom,
+        tool_moved=math.sqrt(((moves @ state[:COUNT]) ** 2).sum(axis=1).mean()),
+        tool_after=math.sqrt(np.einsum("kij,jl,kil->k", moves, covariance, moves).mean()),
         by_design=by_design,
         by_machine=by_machine,
     )
-    if found.gains:
-        return found
-    return replace(found, machine=BuiltMachine(design), tool_after=before)
+    return found if found.gains else replace(found, machine=BuiltMachine(design))
 
 
-def _tool_errors(
-    machine: BuiltMachine, spread: FloatArray, frames: FloatArray, covariance: FloatArray
-) -> tuple[float, float]:
-    """Return RMS errors of the tool by the design and by a machine, but for motions of frames.
-
-    The covariance (31, 31) and the basis of frames (31, j) are over the spread (31,).
-    """
-    poses = sample_poses(machine.design, CHECKED_POSES, seed=1)
-    poses = poses.with_tool(machine.design.tool.position)
-    reached = machine.forward(poses.joints)
-    off = reached.position - poses.position + tool_offset(reached.rotation, poses.tool) - poses.arm
-    slopes = error_by_source(poses)[:, :3] * spread @ (np.eye(COUNT) - frames @ frames.T)
-    left = np.einsum("kij,jl,kil->k", slopes, covariance, slopes)
-    return math.sqrt((off[reached.closes] ** 2).sum(axis=1).mean()), math.sqrt(left.mean())
+def _tool_slopes(design: Design) -> FloatArray:
+    """Return displacements of the tool per deviation in random poses, shape (n, 3, 31)."""
+    poses = sample_poses(design, CHECKED_POSES, seed=1)
+    return error_by_source(poses.with_tool(design.tool.position))[:, :3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,8 +296,8 @@ class _Problem:
                 return state
             last = size
         raise NoAnswerError(
-            f"no machine settles in {MOST_STEPS} steps: measure in more poses, farther from "
-            "singular ones, and state the setup closer to what it is"
+            "no machine settles: check the columns, their units and order, the frame, the design "
+            "and its assembly mode; or measure in more poses, farther from singular ones"
         )
 
     def hold_out(self, state: FloatArray, used: BoolArray) -> list[HeldOut]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
+import math
 from pathlib import Path
 from typing import Literal
 
@@ -21,7 +22,10 @@ from explorer.mechanism.built_machine import BuiltMachine
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Pair, Six
 from explorer.mechanism.pose import Triple
-from explorer.statics.accuracy import drawing_values, from_drawing_values
+from explorer.statics.accuracy import IS_TILT, drawing_values, from_drawing_values
+
+MOST_SHARE, MOST_TILT = 0.1, 10.0
+"""Largest deviations that a file may have: of lengths over the reach, and of angles in degrees."""
 
 
 class PointDeviations(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -98,8 +102,15 @@ def decode_machine(data: bytes, source: str, design: Design) -> BuiltMachine:
         )
     a1, a3, guide, *platform = msgspec.structs.astuple(file.deviations_mm)
     parts = file.zeros_mm, a1, a3, guide, file.guide_tilt_deg, *platform, file.square_deg
-    values = np.concatenate(parts)
-    return BuiltMachine(design, from_drawing_values(design, values))
+    deviations = from_drawing_values(design, np.concatenate(parts))
+    lengths, tilts = (np.abs(deviations[part]).max() for part in (~IS_TILT, IS_TILT))
+    if lengths > MOST_SHARE * design.reach or tilts > math.radians(MOST_TILT):
+        raise InputError(
+            f"{source} deviates by more than anybody builds: lengths by up to "
+            f"{MOST_SHARE * design.reach * design.unit_mm:.3g} mm, a tenth of the reach, and "
+            f"angles by up to {MOST_TILT:g}° are possible"
+        )
+    return BuiltMachine(design, deviations)
 
 
 def load_machine(path: str | Path, design: Design) -> BuiltMachine:

@@ -29,6 +29,9 @@ from explorer.workspace.limits.valid_poses import poses_are_valid
 CANDIDATES = 500
 """Number of poses from which some are chosen."""
 
+MOST_POSES = 1000
+"""Largest number of poses that are chosen."""
+
 CONDITION = 0.01
 """Least inverse condition number of a candidate."""
 
@@ -88,7 +91,7 @@ def calibration_poses(
         NoAnswerError: Too few poses within the limits are fit to be measured.
     """
     measured = setup_of(design, kind) if isinstance(kind, str) else kind
-    most = max(CANDIDATES, whole("the number of poses", count, 1, 10_000))
+    most = max(CANDIDATES, whole("the number of poses", count, 1, MOST_POSES))
     found = sample_poses(design, most, seed)
     if len(found.positions) < count:
         raise NoAnswerError(

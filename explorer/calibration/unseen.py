@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from explorer.calibration.measurement import Measurement
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import A1, A3, GUIDE, PLATFORM, TILT
 from explorer.numerics.arrays import FloatArray
@@ -19,11 +20,14 @@ SEEN, ROUNDING = 1.0, 1e-12
 over the largest information."""
 
 
-def frame_motions(design: Design) -> dict[str, FloatArray]:
-    """Return the deviations by name, each (31,), that to first order move frames or nothing."""
+def frame_motions(design: Design, measured: Measurement) -> dict[str, FloatArray]:
+    """Return the deviations by name, each (31,), that to first order move frames or nothing.
+
+    The platform turns about the first point that is measured of it.
+    """
     # The carriages read less by as much as the guide starts further on.
     along = np.array([{"guide x": 1.0, "d1": -1.0, "d3": -1.0}.get(name, 0.0) for name in SOURCES])
-    motions, points = {"guide x with d1 and d3": along}, design.platform_points
+    motions, points = {"guide x with d1 and d3": along}, design.platform_points - measured.points[0]
     for axis, unit in zip("xyz", np.eye(3), strict=True):
         for name in ("base", "base turn", "platform", "platform turn"):
             motion = motions[f"{name} {axis}"] = np.zeros(len(SOURCES))
@@ -39,7 +43,7 @@ def frame_motions(design: Design) -> dict[str, FloatArray]:
 
 
 def unseen_of(
-    design: Design, spread: FloatArray, information: FloatArray
+    design: Design, measured: Measurement, spread: FloatArray, information: FloatArray
 ) -> tuple[tuple[str, ...], FloatArray]:
     """Return the names of what is unseen, and a basis (31, j) of those that move frames.
 
@@ -53,7 +57,7 @@ def unseen_of(
     least = max(SEEN, ROUNDING * float(sizes[-1]))
     dark, frames = np.zeros((len(spread), int((sizes < least).sum()))), dict[str, FloatArray]()
     dark[free] = vectors[:, sizes < least]
-    for name, motion in frame_motions(design).items():
+    for name, motion in frame_motions(design, measured).items():
         if spread[motion != 0.0].all():
             along = np.divide(motion, spread, out=np.zeros_like(motion), where=spread > 0.0)
             along /= np.linalg.norm(along)

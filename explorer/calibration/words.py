@@ -52,7 +52,8 @@ def calibration_blocks(found: Calibration) -> Iterator[block.Block]:
                 "χ²",
                 (block.Number(found.chi_square), f" of {found.degrees_of_freedom} expected"),
             ),
-            block.Fact("poses left out as wrong", left_out),
+            block.Fact("poses left out", left_out, "wrong, or their legs do not close"),
+            block.Fact("beyond their tolerances", ", ".join(found.beyond) or "none"),
         ),
     )
     yield _residuals(found)

@@ -1,7 +1,8 @@
 """Tables of what was measured of a machine: the joints that its encoders read, and the values.
 
 A line has the columns of the joints, and bar, gauge, t1_x to t3_z, or position and orientation, of
-which the first that are there count; `sigma_mm` is the standard deviation of its lengths.
+which the first that are there count; `sigma_mm` is the standard deviation of its lengths, and
+`plane` the number of the plane of a gauge.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.calibration.measurement import Kind, Measurement
-from explorer.export.pose_tables import SIGMA, TARGETS, PoseTable, read_joints, read_poses
+from explorer.errors import InputError
+from explorer.export.pose_tables import PLANE, SIGMA, TARGETS, PoseTable, read_joints, read_poses
 from explorer.export.tables import length_heads
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
@@ -31,6 +33,11 @@ def read_measured(
         InputError: A column is missing, or a cell is faulty.
     """
     if setup.kind == "poses":
+        if not table.has_orientations:
+            raise InputError(
+                f"{table.file} has no orientations, such as qw, qx, qy and qz; the positions of "
+                "one point are those of a target, t1_x, t1_y and t1_z"
+            )
         poses = read_poses(table, design, design.home_pose.rotation)
         turns = Rotation.from_matrix(poses.rotations).as_rotvec()
         values = np.concatenate([poses.positions, turns], axis=1)
@@ -39,15 +46,29 @@ def read_measured(
         values = table.numbers(*targets, blank=np.nan)
     sigma = np.broadcast_to(setup.sigma, values.shape).copy()
     if SIGMA in table.columns:
-        sigma[:, : 3 if setup.kind == "poses" else None] = table.numbers(SIGMA)
-    return read_joints(table), replace(setup, values=values, sigma=sigma)
+        sigma[:, : 3 if setup.kind == "poses" else None] = stated = table.numbers(SIGMA)
+        if (stated <= 0.0).any():
+            table.refuse(int(stated.argmin()), SIGMA, "a number above zero is needed")
+    plane = setup.plane
+    if PLANE in table.columns:
+        plane = table.numbers(PLANE)[:, 0].astype(np.int64) - 1
+        for index in np.flatnonzero((plane < 0) | (plane >= max(1, len(setup.base))))[:1].tolist():
+            table.refuse(index, PLANE, f"the number of a plane, 1 to {len(setup.base)}, is needed")
+    return read_joints(table), replace(setup, values=values, sigma=sigma, plane=plane)
 
 
-def joints_table(poses: Configuration) -> str:
-    """Return the joints of poses (n,), as a table to which what is measured is added."""
-    head = ["line", *length_heads(JOINTS, poses.design.unit_mm)]
-    rows = (f"{1 + k},{','.join(map(repr, row))}" for k, row in enumerate(poses.joints.tolist()))
-    return "\n".join([",".join(head), *rows, ""])
+def joints_table(poses: Configuration, setup: Measurement) -> str:
+    """Return the joints of poses (n,), as a table to which what is measured is added.
+
+    Planes of a gauge, if they are several, have their numbers.
+    """
+    rows = [[str(1 + k), *map(repr, row)] for k, row in enumerate(poses.joints.tolist())]
+    rows.insert(0, ["line", *length_heads(JOINTS, poses.design.unit_mm)])
+    if len(setup.base) > 1:
+        numbers: list[int] = (1 + np.resize(setup.plane, len(rows) - 1)).tolist()
+        for row, cell in zip(rows, (PLANE, *numbers), strict=True):
+            row.append(str(cell))
+    return "\n".join([*map(",".join, rows), ""])
 
 
 def kind_of(table: PoseTable) -> Kind:

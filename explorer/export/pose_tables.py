@@ -50,7 +50,7 @@ POSITION, TOOL = ("x", "y", "z"), ("tool_x", "tool_y", "tool_z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 YAW_PITCH_ROLL, TILT_TORSION = ("yaw", "pitch", "roll"), ("azimuth", "tilt", "torsion")
 TARGETS = tuple(f"t{k}_{axis}" for k in (1, 2, 3) for axis in "xyz")
-DISTANCES, SIGMA = ("bar", "gauge"), "sigma"
+DISTANCES, SIGMA, PLANE = ("bar", "gauge"), "sigma", "plane"
 """The columns of what is measured, besides positions and orientations."""
 _ROTATIONS: dict[tuple[str, ...], Callable[[ArrayLike], FloatArray]] = {
     QUATERNION: rotation_from_quaternion,
@@ -65,7 +65,7 @@ _ANGLE = {"deg": 1.0, "°": 1.0, "degrees": 1.0, "rad": _RADIAN, "radians": _RAD
 _UNITS: dict[str, Mapping[str, float]] = {
     **dict.fromkeys((*JOINTS, *POSITION, *TOOL, *TARGETS, *DISTANCES, SIGMA), _LENGTH),
     **dict.fromkeys((*YAW_PITCH_ROLL, *TILT_TORSION), _ANGLE),
-    **{name: {} for name in QUATERNION},
+    **{name: {} for name in (*QUATERNION, PLANE)},
     "time": {"s": 1.0},
 }
 _HEADING = re.compile(

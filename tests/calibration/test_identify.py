@@ -139,7 +139,9 @@ def test_kinds_of_measurement_see_all_but_what_is_named(
     assert found.seen == COUNT - len(unseen)
     assert abs(found.excess) < 3.0
     # But for the frames, the tool is where the machine that was found has it.
-    frames = np.array([motion for name, motion in frame_motions(TYPICAL).items() if name in unseen])
+    frames = np.array(
+        [motion for name, motion in frame_motions(TYPICAL, POSES).items() if name in unseen]
+    )
     off = relative_errors(session.machine, found.machine, frames)
     assert rms(off) < 1.8 * found.tool_after
     assert found.tool_after < 30.0 * MICROMETRE
@@ -246,7 +248,7 @@ def test_small_motion_of_the_base_frame_changes_the_numbers_of_the_frame_alone()
     expected = first.inverse(RANDOM.position, RANDOM.rotation)
     assert_allclose(second.inverse(positions, rotations), expected, atol=1e-9)
     off = second.deviations - first.deviations
-    motions = frame_motions(TYPICAL)
+    motions = frame_motions(TYPICAL, POSES)
     frames = np.array([motions[name] for name in (ALONG_GUIDE, *BASE)])
     rest = off - np.linalg.lstsq(frames.T, off, rcond=None)[0] @ frames
     assert np.abs(off).max() > 5e-3
@@ -353,7 +355,7 @@ def test_poses_that_cannot_close_and_values_that_are_missing_are_left_out(
     assert found.outliers.tolist() == [4]
     width = values.shape[1]
     assert np.isnan(found.residuals).sum() == 3 * width - 3
-    assert found.degrees_of_freedom == 27 * width + 3 - kind.unknowns
+    assert found.degrees_of_freedom == 27 * width + 3 - kind.unknowns - found.seen
     keep = np.setdiff1d(np.arange(30), [4, 11])
     other = calibrate(TYPICAL, readings[keep], replace(measured, values=values[keep]))
     assert_allclose(other.machine.deviations, found.machine.deviations, atol=1e-7)
@@ -384,6 +386,39 @@ def test_few_poses_name_what_would_have_to_be_known() -> None:
     tolerances = stated_tolerances(TYPICAL)
     tolerances[[SOURCES.index(name) for name in named]] = 0.0
     assert calibrate(TYPICAL, session.readings, session.exact, tolerances).unseen == (ALONG_GUIDE,)
+
+
+@pytest.mark.parametrize("kind", [POSES, TARGETS, replace(BAR, sigma=TARGETS.sigma)])
+@pytest.mark.parametrize("size", [0.3, 100.0])
+def test_one_pose_that_is_grossly_wrong_is_left_out(kind: Measurement, size: float) -> None:
+    session = Session.of(kind, CHOSEN, 4)
+    values = session.measured.values.copy()
+    values[5, 0] += size
+    if kind.kind == "poses":
+        values[5, 3:] = [0.0, 0.5 * np.pi, 0.0]
+    found = calibrate(TYPICAL, session.readings, replace(session.measured, values=values))
+    assert found.outliers.tolist() == [5]
+    assert found.gains
+
+
+def test_platform_that_turns_about_a_known_point_is_no_lack_of_poses() -> None:
+    kind = replace(TARGETS, values=np.zeros((0, 3)), points=PLACES[:1], points_known=True)
+    session = Session.of(kind, calibration_poses(TYPICAL, 40, kind), 1)
+    found = calibrate(TYPICAL, session.readings, session.measured)
+    assert found.faults == []
+    assert found.unseen == (ALONG_GUIDE, *(f"platform turn {axis}" for axis in "xyz"))
+
+
+def test_zero_beyond_its_tolerance_is_identified_and_told() -> None:
+    session = Session.of(POSES, CHOSEN, 1)
+    readings = session.readings.copy()
+    readings[:, 0] -= 0.1
+    found = calibrate(TYPICAL, readings, session.measured)
+    assert found.faults == []
+    assert found.beyond == ["l1"]
+    off = found.machine.deviations[0] - session.machine.deviations[0] - 0.1
+    # The tolerance pulls it back by a hundredth.
+    assert abs(off) < 0.002
 
 
 @pytest.mark.parametrize("kind", [TARGETS, PRECISE, WALLS])

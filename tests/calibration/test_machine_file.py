@@ -65,6 +65,8 @@ def test_limits_and_names_may_change_but_not_the_variables() -> None:
         ("zeros_mm", [0.0] * 5, "zeros_mm"),
         ("zeros_mm", [0.0, 0.0, 0.0, 0.0, 0.0, "1"], "zeros_mm[5]: expected a number"),
         ("deviations_mm", {"a1": [0.0, 0.0, 0.0]}, "the field `a3` of deviations_mm is missing"),
+        ("zeros_mm", [0.0] * 5 + [30.0], "lengths by up to 20.4 mm"),
+        ("square_deg", [0.0, -15.0], "angles by up to 10°"),
         ("zero_mm", [0.0], "zero_mm is unknown, did you mean zeros_mm?"),
     ],
 )

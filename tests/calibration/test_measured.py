@@ -106,7 +106,7 @@ def test_aligned_values_are_those_of_the_base_frame() -> None:
 def test_frame_motions_move_frames_and_nothing_else() -> None:
     size = 1e-5
     exact = design_itself().inverse(SAMPLE.position, SAMPLE.rotation)
-    for name, motion in frame_motions(TYPICAL).items():
+    for name, motion in frame_motions(TYPICAL, POSES).items():
         machine = BuiltMachine(TYPICAL, size * motion)
         p, r = SAMPLE.position, SAMPLE.rotation
         body, *kind = name.split()

@@ -34,7 +34,14 @@ from explorer.mechanism.pose import quaternion_from_rotation
 TRUE = true_machine(np.random.default_rng(7))
 KEYS = {
     *("file", "assumed", "machine", "seen", "unseen", "chi_square", "degrees", "outliers"),
-    *("tool_before_mm", "tool_after_mm", "held_out_mm", "held_out_by_design_mm", "faults"),
+    *(
+        "beyond",
+        "tool_before_mm",
+        "tool_after_mm",
+        "held_out_mm",
+        "held_out_by_design_mm",
+        "faults",
+    ),
 }
 
 
@@ -121,12 +128,52 @@ def test_targets_that_were_hidden_are_blank(cli: CommandLine, tmp_path: Path) ->
         row[6 + 3 * (k % 3) : 9 + 3 * (k % 3)] = ["", " ", ""]
     given.write_text("\n".join([head, *(",".join(row) for row in cells)]))
     found = cli.answer("calibrate", "--measured", given, "--out", out, *setup)
-    assert found["degrees"] == 20 * 6 - 9
+    assert found["degrees"] == 20 * 6 - 9 - found["seen"]
     assert 10.0 * found["tool_after_mm"] < found["tool_before_mm"]
     cells[2][0] = ""
     given.write_text("\n".join([head, *(",".join(row) for row in cells)]))
     _, error = cli.run("calibrate", "--measured", given, "--out", out, *setup, status=2)
     assert "line 4, column l1_mm" in error
+
+
+def test_planes_of_a_gauge_stay_with_their_poses(cli: CommandLine, tmp_path: Path) -> None:
+    poses, out, point = tmp_path / "poses.csv", tmp_path / "machine.json", write_points(tmp_path, 1)
+    planes = ("--planes", *WALLS.base.ravel().tolist())
+    setup = ("--typical", "--targets", point, "--sigma", 0.001, *planes)
+    argv = ("calibrate", "poses", "--measure", "gauge", "--count", 90, "--out", poses)
+    cli.run(*argv, *setup)
+    numbers = [row["plane"] for row in csv.DictReader(poses.read_text().splitlines())]
+    assert numbers == ["1", "2", "3"] * 30
+    given = measure(poses, replace(WALLS, sigma=np.array(1e-4)))
+    head, *lines = given.read_text().splitlines()
+    lines = [f"{line},{number}" for line, number in zip(lines, numbers, strict=True)]
+    given.write_text("\n".join([f"{head},plane", *lines]))
+    found = cli.answer("calibrate", "--measured", given, "--out", out, *setup)
+    del lines[4]
+    given.write_text("\n".join([f"{head},plane", *reversed(lines)]))
+    other = cli.answer("calibrate", "--measured", given, "--out", out, *setup)
+    assert other["seen"] == found["seen"]
+    assert other["chi_square"] == pytest.approx(found["chi_square"], abs=20.0)
+    given.write_text("\n".join([f"{head},plane", f"{lines[0].rpartition(',')[0]},4"]))
+    _, error = cli.run("calibrate", "--measured", given, "--out", out, *setup, status=2)
+    assert "line 2, column plane: '4': the number of a plane, 1 to 3" in error
+
+
+def test_tables_that_cannot_be_meant_are_refused(cli: CommandLine, tmp_path: Path) -> None:
+    poses, out = tmp_path / "poses.csv", tmp_path / "machine.json"
+    cli.run("calibrate", "poses", "--typical", "--out", poses)
+    given = measure(poses, POSES)
+    argv = ("calibrate", "--measured", given, "--typical", "--out")
+    text = given.read_text()
+    assert "is the table to read" in cli.run(*argv, given, status=2)[1]
+    assert given.read_text() == text
+    given.write_text(
+        text.replace("qw", "aw").replace("qx", "ax").replace("qy", "ay").replace("qz", "az")
+    )
+    assert "has no orientations" in cli.run(*argv, out, status=2)[1]
+    head, *lines = text.splitlines()
+    given.write_text("\n".join([f"{head},sigma_mm", *(f"{line},0" for line in lines)]))
+    assert "line 2, column sigma_mm: '0'" in cli.run(*argv, out, status=2)[1]
 
 
 def test_wrong_poses_are_named_from_one(cli: CommandLine, tmp_path: Path) -> None:
@@ -181,7 +228,7 @@ def test_column_of_sigma_counts_in_place_of_the_option(cli: CommandLine, tmp_pat
             "the normal of a plane must not be all zeros",
         ),
         (("poses", "--planes", "0", "0", "1"), "1 to 3 planes"),
-        (("poses", "--count", "0"), "must lie within 1 to 10000"),
+        (("poses", "--count", "0"), "must lie within 1 to 1000"),
     ],
 )
 def test_faulty_options_are_refused(

@@ -14,7 +14,7 @@ import tyro
 from explorer.calibration.identify import Calibration, calibrate
 from explorer.calibration.machine_file import encode_machine
 from explorer.calibration.measurement import Kind, Measurement, setup_of
-from explorer.calibration.poses import calibration_poses
+from explorer.calibration.poses import MOST_POSES, calibration_poses
 from explorer.calibration.words import calibration_blocks
 from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
@@ -52,7 +52,7 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
     measure: Annotated[Kind, _POSES] = "poses"
     """What will be measured."""
 
-    count: Annotated[int, values.whole_number(1, 10_000), _POSES] = 12
+    count: Annotated[int, values.whole_number(1, MOST_POSES), _POSES] = 12
     """Number of poses."""
 
     targets: Annotated[Path | None, values.FILE] = None
@@ -85,11 +85,14 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
         if (self.measured is None) != (self.what == "poses"):
             raise InputError("give either --measured FILE.csv, or the word poses")
         if self.measured is None:
-            poses = calibration_poses(design, self.count, self._setup(design, self.measure))
-            write_whole(self.out, joints_table(poses).encode())
+            setup = self._setup(design, self.measure)
+            poses = calibration_poses(design, self.count, setup)
+            write_whole(self.out, joints_table(poses, setup).encode())
             lines = [*output.assumed_lines(assumed), f"poses written to {self.out}: {self.count}"]
             self.write(lambda: {"file": self.out, "count": self.count, "assumed": assumed}, lines)
             return
+        if self.out.exists() and self.out.samefile(self.measured):
+            raise InputError(f"--out {self.out} is the table to read; name another file")
         table = pose_tables.read_table(self.measured, design.unit_mm)
         found = calibrate(
             design, *read_measured(table, design, self._setup(design, kind_of(table)))
@@ -141,7 +144,8 @@ def _json(found: Calibration) -> dict[str, object]:
         "degrees": found.degrees_of_freedom,
         "outliers": 1 + found.outliers,
         "tool_before_mm": unit * found.tool_before,
-        "tool_after_mm": unit * found.tool_after,
+        "tool_after_mm": unit * (found.tool_after if found.gains else found.tool_before),
+        "beyond": found.beyond,
         "held_out_mm": unit * found.by_machine.distance,
         "held_out_by_design_mm": unit * found.by_design.distance,
         "faults": found.faults,
