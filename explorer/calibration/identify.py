@@ -48,7 +48,7 @@ FOLDS = 5
 """Number of parts of the poses, each of which is held out once."""
 
 MOST_EXCESS = 3.0
-"""Largest excess of the sum of squares, in its standard deviations, that is no fault."""
+"""Largest excess of the sum of squares, in standard deviations, that is no fault."""
 
 CLEARLY = 2.0
 """Least displacement of the tool by what was identified, over the error that is left."""
@@ -111,9 +111,10 @@ class Calibration:
 
     @property
     def excess(self) -> float:
-        """Sum of squares above its expectation, over its standard deviation."""
-        freedom = self.degrees_of_freedom
-        return (self.chi_square - freedom) / math.sqrt(2.0 * max(1, freedom))
+        """Sum of squares as a deviation of the normal distribution (Wilson and Hilferty, 1931)."""
+        freedom = max(1, self.degrees_of_freedom)
+        spread = 2.0 / (9.0 * freedom)
+        return (math.cbrt(self.chi_square / freedom) - 1.0 + spread) / math.sqrt(spread)
 
     @property
     def worst_poses(self) -> list[int]:
