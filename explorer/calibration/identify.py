@@ -150,7 +150,8 @@ class Calibration:
         hidden = ", ".join(name for name in self.unseen if name in SOURCES)
         worst = ", ".join(str(1 + k) for k in self.worst_poses)
         words = {
-            "nothing gained: the design predicts poses held out better": not self.gains,
+            "nothing gained: where it was not measured, the machine is not clearly better than the "
+            "design": not self.gains,
             f"too few poses, or too coarse, to see {hidden}": hidden,
             f"χ² is {self.excess:.1f}σ above its expectation, most in poses {worst}": (
                 self.excess > MOST_EXCESS
