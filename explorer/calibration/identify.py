@@ -88,9 +88,9 @@ class Calibration:
         outliers: Poses that are left out: they are wrong, or their legs do not close.
         chi_square: Sum of squares of the residuals of poses that are not left out.
         degrees_of_freedom: Its expectation: their number less that of what was fitted.
-        tool_moved: Root mean square by which the tool of the most likely machine is off where the
-            design has it, over other poses and but for the frames of the measurement, in units.
-        tool_after: That of its error, by the covariance.
+        tool_moved: Root mean square displacement of the tool by the most likely deviations, in
+            random poses and but for the frames of the measurement, in design units.
+        tool_after: Root mean square error of the tool that is left there, by the covariance.
         by_design: What the design tells of poses that were held out; the setup alone is fitted.
         by_machine: What machines of the other poses tell of them.
     """

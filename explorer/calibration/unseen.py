@@ -8,6 +8,7 @@ are unseen, since the poses are few, are named by sources that would have to be 
 from __future__ import annotations
 
 import numpy as np
+from scipy import linalg
 
 from explorer.calibration.measurement import Measurement
 from explorer.mechanism.design import Design
@@ -50,8 +51,6 @@ def unseen_of(
     The spread (31,) has the standard deviations of the sources before the measurement, in design
     units; information (31, 31) and basis are over these.
     """
-    from scipy import linalg
-
     free = np.flatnonzero(spread > 0.0)
     sizes, vectors = np.linalg.eigh(information[np.ix_(free, free)])
     least = max(SEEN, ROUNDING * float(sizes[-1]))

@@ -17,7 +17,7 @@ from explorer.cli import values
 from explorer.cli.output import write_json
 from explorer.cli.streams import write
 from explorer.errors import DesignError, ExplorerError, InputError, StorageError
-from explorer.files.writing import write_whole
+from explorer.files.writing import check_writable, write_whole
 from explorer.mechanism.configuration import Point, offset_of, tool_offset, tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design, typical_machine
@@ -315,3 +315,15 @@ def carrying_part(workspace: Workspace, load: Six, tolerance: float | None) -> C
 
     check_has_limits(workspace.design)
     return carried_region(workspace, load, tolerance=tolerance)
+
+
+def check_out(out: Path, table: Path | None) -> None:
+    """Check that a file can be written, and is not the table that is read.
+
+    Raises:
+        InputError: The file is the table.
+        StorageError: The file cannot be written.
+    """
+    if table is not None and table.exists() and out.exists() and out.samefile(table):
+        raise InputError(f"--out {out} is the table to read; name another file")
+    check_writable(out)

@@ -18,6 +18,13 @@ RAIL: Rgb = (128, 138, 152)
 CARRIAGE: Rgb = (104, 115, 132)
 LEAVES: tuple[Rgb, Rgb] = ((176, 156, 112), (96, 140, 136))
 
+# Colours of lines and bars in charts, visible on light and dark panels alike.
+BLUE: Rgb = (46, 116, 208)
+TEAL: Rgb = (30, 150, 135)
+VIOLET: Rgb = (150, 120, 190)
+ORANGE: Rgb = (214, 74, 24)
+NEUTRAL: Rgb = (120, 134, 156)
+
 
 def css(colour: Rgb) -> str:
     """Return the colour as hexadecimal CSS."""

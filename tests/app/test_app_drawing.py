@@ -34,7 +34,7 @@ from explorer.app.scene.shapes import cylinder, plate, sphere, turn_z_to
 from explorer.app.scene.surfaces import COLLIDING, PLAIN
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
-from explorer.app.widgets import charts
+from explorer.mechanism import rgb as colours
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
@@ -80,7 +80,7 @@ def test_words_are_legible_in_both_themes(name: str) -> None:
 def test_lines_of_charts_and_alerts_are_seen_in_both_themes() -> None:
     for chart in ("BLUE", "TEAL", "VIOLET", "ORANGE", "NEUTRAL"):
         for backgrounds in (LIGHT, DARK):
-            assert contrast(getattr(charts, chart), rgb(backgrounds["panel"])) >= 3.0
+            assert contrast(getattr(colours, chart), rgb(backgrounds["panel"])) >= 3.0
     assert contrast(OUTLINE, rgb(LIGHT["panel"])) >= 3.0
 
 

@@ -16,8 +16,7 @@ import viser
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from explorer.app.widgets.charts import NEUTRAL
-from explorer.mechanism.rgb import Rgb, linear
+from explorer.mechanism.rgb import NEUTRAL, Rgb, linear
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.page.widgets.assigning import Update
 

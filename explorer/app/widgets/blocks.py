@@ -6,12 +6,11 @@ import bisect
 from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 
-from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, TEAL, VIOLET
 from explorer.app.widgets.markup import box, caption, dim, meter, row, swatch, table
 from explorer.measures.blocks import block as kinds
 from explorer.measures.blocks.block import UTILISATION_EDGES
 from explorer.measures.position_bands import UTILISATION_COLOURS
-from explorer.mechanism.rgb import Rgb, css
+from explorer.mechanism.rgb import BLUE, NEUTRAL, ORANGE, TEAL, VIOLET, Rgb, css
 from explorer.numerics.number_text import format_decimals
 
 KIND_COLOURS: dict[kinds.Kind, Rgb] = {"actuator": BLUE, "dimension": ORANGE}

@@ -20,7 +20,7 @@ from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import pose_tables
 from explorer.export.measured_tables import joints_table, kind_of, read_measured
-from explorer.files.writing import check_writable, write_whole
+from explorer.files.writing import write_whole
 from explorer.mechanism.design import Design
 
 What = Literal["machine", "poses"]
@@ -79,7 +79,7 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
 
     def run(self) -> None:
         """Write the machine or the poses."""
-        check_writable(self.out)
+        options.check_out(self.out, self.measured)
         nominal = self.read_design()
         design, assumed = self.with_typical(nominal)
         if (self.measured is None) != (self.what == "poses"):
@@ -91,8 +91,6 @@ class CalibrateCommand(options.JsonOptions, options.TypicalOptions, options.Desi
             lines = [*output.assumed_lines(assumed), f"poses written to {self.out}: {self.count}"]
             self.write(lambda: {"file": self.out, "count": self.count, "assumed": assumed}, lines)
             return
-        if self.out.exists() and self.out.samefile(self.measured):
-            raise InputError(f"--out {self.out} is the table to read; name another file")
         table = pose_tables.read_table(self.measured, design.unit_mm)
         found = calibrate(
             design, *read_measured(table, design, self._setup(design, kind_of(table)))

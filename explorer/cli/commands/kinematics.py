@@ -13,7 +13,7 @@ import numpy as np
 from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import pose_tables
-from explorer.files.writing import check_writable, write_whole
+from explorer.files.writing import write_whole
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism import kinematics
 from explorer.mechanism.configuration import Configuration, tool_offset
@@ -114,9 +114,7 @@ def _files(option: str, table: Path | None, out: Path | None) -> tuple[Path, Pat
         return None
     if table is None or out is None:
         raise InputError(f"{option} FILE.csv is read and --out FILE.csv is written: give both")
-    if table.exists() and out.exists() and out.samefile(table):
-        raise InputError(f"--out {out} is the table to read; name another file")
-    check_writable(out)
+    options.check_out(out, table)
     return table, out
 
 

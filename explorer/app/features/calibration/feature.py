@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from explorer.app.features.feature import Feature, Services, Tab, html_of
 from explorer.app.inputs.controls import Controls
@@ -72,6 +73,12 @@ def _request_for(frame: Frame) -> tuple[Design, Calibrated] | None:
 CALIBRATION_FEED = FeedOf(calibrate_table, _request_for, process="calibrate", in_scene=False)
 
 
+@lru_cache(2)
+def machine_html(found: Calibration) -> str:
+    """Return what a calibration tells as HTML."""
+    return render(calibration_blocks(found))
+
+
 class CalibrationPanel:
     """How well lengths and turns are known, what the table tells of the machine, and its file."""
 
@@ -102,9 +109,7 @@ class CalibrationPanel:
         content, has_table = box(dim(DROP)), bool(Calibrated.of(frame.state).measured)
         yield self._forget, "visible", has_table
         if has_table:
-            told = html_of(
-                self._feed, lambda found: render(calibration_blocks(found)), "No machine"
-            )
+            told = html_of(self._feed, machine_html, "No machine")
             assumed = "; ".join(typical_machine(frame.state.design)[1])
             note = dim(f"Assumed, since the design states none: {assumed}.")
             content = f"{told}{box(note) if assumed else ''}"

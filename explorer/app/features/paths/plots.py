@@ -16,14 +16,13 @@ from explorer.app.features.loads.load import Loads
 from explorer.app.features.paths.state import Journey, Paths, journey_of
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.charts import ORANGE
 from explorer.app.widgets.markup import margin_name, note, swatch
 from explorer.export.drawings.charts import Chart, ends_of
 from explorer.export.drawings.markup import circle, drawing_text, line, page_picture
 from explorer.measures.blocks.block import MOST_SHARE, Share
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
-from explorer.mechanism.rgb import css
+from explorer.mechanism.rgb import ORANGE, css
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_decimals, format_number
 from explorer.paths.loads import DemandedLoad, PathLoads
