@@ -72,6 +72,7 @@ SCRIPTS = (
     "names",
     "opens",
     "stops",
+    "search",
     "projection",
     "labels",
     "layers",
@@ -89,8 +90,6 @@ MOST_PENDING = 10
 PANELS_SECONDS, DRAG_PAUSE = 0.003, 0.1
 # Seconds without a frame after which cameras follow what was drawn.
 FOLLOW_SECONDS = 0.35
-# Properties that decide whether a control can be used.
-USABILITY = ("disabled", "visible")
 
 
 class Page:
@@ -267,15 +266,8 @@ class Page:
         self._assigner.assign(drawn, since=began)
         for runner in self.runners:
             runner.follow(frame)
-        changed = self._assigner.assign(
-            self._panel_updates(frame, is_dragged=is_dragged and not is_drawn), since=began
-        )
-        # A command is enabled as its control is, so that it is updated after the controls.
-        controls = any(name in USABILITY for _, name, _ in changed)
-        self._assigner.assign(self.palette.updates(controls=controls))
-        for feature in self._features:
-            if feature.passing is not None:
-                self.palette.offer(feature.name, feature.passing(self.services))
+        panels = self._panel_updates(frame, is_dragged=is_dragged and not is_drawn)
+        self._assigner.assign(panels, since=began)
         if self._assigner.resend_crossed():
             self._quiet_pause.begin()
         self._camera_pause.begin()

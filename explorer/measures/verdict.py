@@ -50,6 +50,13 @@ TITLES: dict[Kind, str] = {
     "near": "Near a singularity",
     "clear": "Clear of singularities",
 }
+MEANINGS: dict[Kind, str] = {
+    "singular": "The platform can still move though all actuators are locked, and no forces of "
+    "the actuators hold every load.",
+    "near": "A small motion makes the platform singular: forces and errors are large here.",
+    "clear": "The actuators hold the platform, and no singular pose is near.",
+}
+"""What each verdict means, in a sentence."""
 
 
 class Warnings(NamedTuple):

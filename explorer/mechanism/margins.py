@@ -27,6 +27,13 @@ INCIDENCES = (
 )
 """The incidence at a margin of zero, in the order δ1, δ2, δ3."""
 
+MARGIN_WORDS = (
+    "how far a1 is from the platform plane",
+    "how far the lines a1a2 and b2b3 are from meeting",
+    "how far b4 is from the base plane",
+)
+"""What each margin says, in the order δ1, δ2, δ3."""
+
 TETRAHEDRA = (("b1", "b2", "b3", "a1"), ("a1", "a2", "b2", "b3"), ("b4", "a1", "a2", "a3"))
 """The tetrahedra of the three trilaterations, in the order δ1, δ2, δ3."""
 

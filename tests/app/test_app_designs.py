@@ -13,7 +13,7 @@ from services import services_for
 
 from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns, rows_of
 from explorer.app.features.feature import Services
-from explorer.app.features.history.feature import HISTORY
+from explorer.app.features.history.feature import HISTORY, MOVE, UndoButtons
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import MarkSaved, Open, Set, SetName
 from explorer.app.state.frame import Frame
@@ -255,3 +255,28 @@ def test_missing_design_is_neither_renamed_nor_opened_with_a_short_reason(
     assert desk.complaints[0] == "the design is not saved yet; save it before you rename it"
     assert "no design is called" in desk.complaints[1]
     assert len(desk.complaints[1]) < 500
+
+
+def test_undo_right_after_a_deletion_brings_the_design_back(
+    desk: Desk, saved: SavedDesigns, services: Services, buttons: Buttons
+) -> None:
+    bar = UndoButtons(services)
+    save_as(desk, saved, "mine")
+    here = desk.state
+    saved.delete("mine")
+    settle(desk, saved)
+    assert 'aria-label="Undo Delete mine"' in bar(Frame(desk.state))
+    desk.press(buttons, MOVE, "Undo")
+    settle(desk, saved)
+    assert names(saved) == ["mine"]
+    assert desk.state == here
+    # What was done since is undone first, and then nothing is left to bring back.
+    saved.delete("mine")
+    settle(desk, saved)
+    desk.session.do(SetVariable("b2", 3.0))
+    settle(desk, saved)
+    assert "Delete mine" not in bar(Frame(desk.state))
+    desk.press(buttons, MOVE, "Undo")
+    settle(desk, saved)
+    assert names(saved) == []
+    assert desk.state.design == here.design

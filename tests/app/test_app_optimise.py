@@ -23,6 +23,7 @@ from limited_designs import limited
 from sample_states import iterates_of
 from services import services_for
 
+from explorer.app.features.compare.table import ComparedDesign
 from explorer.app.features.optimise import runner as optimiser
 from explorer.app.features.optimise.actions import (
     Accept,
@@ -42,6 +43,7 @@ from explorer.app.features.optimise.feature import (
 )
 from explorer.app.features.optimise.runner import Optimiser, result_of
 from explorer.app.features.optimise.state import (
+    REACHED,
     Optimisation,
     OptimisationRequest,
     SearchRun,
@@ -51,6 +53,8 @@ from explorer.app.features.optimise.words import (
     limit_rows,
     result_words,
     search_notice,
+    search_words,
+    verdict_words,
 )
 from explorer.app.features.optimise.work import (
     complete_request,
@@ -74,6 +78,7 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.jobs.jobs import Jobs
 from explorer.jobs.process import Channel
+from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.number_text import UNITS
@@ -135,7 +140,7 @@ def mechanism_of(state: State) -> State:
 def buttons_of(state: State) -> dict[str, str]:
     """Return whether each button is filled, enabled or disabled, by its name, in their order."""
     looks: dict[str, str] = {}
-    for tag in re.findall("<button[^>]*>", result_words(state)):
+    for tag in re.findall("<button[^>]*>", search_words(state)):
         (name,) = re.findall('data-press="([^"]*)"', tag)
         is_filled = "is-main" in tag
         looks[name] = "disabled" if " disabled" in tag else "filled" if is_filled else "enabled"
@@ -243,6 +248,7 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     assert filled_buttons(state) == [ACCEPT]
     assert {buttons_of(state)[name] for name in (REVERT, START)} == {"enabled"}
     assert result_words(state, bench.services.get(BuildVerdict).html()) in bench.markup
+    assert any(search_words(state) in str(each) for each in bench.markup)
     for design in (asked.design, before.design):
         bench.session.do(UNDO)
         assert bench.state.design == design
@@ -308,7 +314,7 @@ def test_killed_process_leaves_the_design_and_the_panel_says_so(bench: Bench) ->
     assert mechanism_of(state) == mechanism_of(open_state(paper_start()))
     assert run.verdict is not None
     assert run.verdict.status == "failed"
-    assert "died" in result_words(state)
+    assert "died" in search_words(state)
     assert ACCEPT not in buttons_of(state)
     assert len(bench.reports) == 1
     bench.reports.clear()
@@ -341,14 +347,14 @@ def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened
     notice = search_notice(found)
     assert notice is not None
     assert (notice.title, notice.text) == ("Converged", "volume 8,000 cm³")
-    assert "Volume 8,000 cm³ after" in result_words(found)
+    assert "Volume 8,000 cm³ after" in search_words(found)
     assert notice.buttons == (ACCEPT, REVERT)
     assert (buttons_of(found)[ACCEPT], buttons_of(found)[REVERT]) == ("filled", "enabled")
     after = Accept().apply(found)
     assert search_notice(after) is None
     assert after.design.variables == best_of(run_of(after)).design.variables
     assert not {ACCEPT, REVERT} & {*buttons_of(after)}
-    assert "accepted" in result_words(after)
+    assert "accepted" in search_words(after)
     record = Optimisation.of(after).record
     assert record is not None
     assert record.problem == run_of(after).problem
@@ -469,11 +475,51 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     assert liftable_limits(before) == (limit,)
     assert filled_buttons(before) == [LIFT]
     assert buttons_of(before)[START] == "disabled"
-    assert f">{title}<" in result_words(before)
+    assert f">{title}<" in search_words(before)
     assert LiftLimit(limit).title == title
     after = LiftLimit(limit).apply(before)
     assert limit not in {refusal.limit for refusal in find_refusals(after)}
     assert after.design.home_pose == design.home_pose
+
+
+def test_words_of_a_search_are_in_the_unit_of_the_page(found: State) -> None:
+    run = run_of(found)
+    assert run.verdict is not None
+    best = best_of(run)
+    told = "no design was found with a volume of 8,000 units³, such as at (1, −2.5, 0) units"
+    for message in (told, result_of(replace(run, phase="cancelling"), "", (best,)).message):
+        verdict = replace(run.verdict, status="infeasible", message=message)
+        in_mm = with_value(with_value(found, "view.lengths", "mm"), "optimisation.run", run)
+        words = verdict_words(in_mm, run, verdict)
+        assert "units" not in words
+        assert REACHED not in words
+        assert "10 mm" not in words
+    assert "of 8,000 cm³, such as at (10, −25, 0) mm" in verdict_words(
+        in_mm, run, replace(verdict, message=told)
+    )
+
+
+def test_verdict_is_gone_with_the_design_that_it_is_about(found: State) -> None:
+    assert "Converged" in search_words(found)
+    after = SetVariable("b2", 3.3).apply(found)
+    assert "Converged" not in search_words(after)
+    assert "changed by hand" in search_words(after)
+
+
+def test_table_of_a_search_names_each_unit_once_and_writes_no_rounding(found: State) -> None:
+    run = run_of(found)
+    own = run.own.design
+    demands = msgspec.structs.replace(run.problem.demands, clearance=0.2)
+    problem = msgspec.structs.replace(run.problem, demands=demands)
+    both = compare_designs(problem, own, best_of(run).design)
+    ended = with_value(found, "optimisation.run.comparison", both)
+    ended = with_value(ended, "view.lengths", "mm")
+    words = re.sub(r"<[^>]*>", " ", comparison_table(run_of(ended), ended.view))
+    assert not re.search(r"\bmm\s+mm\b", words)
+    assert "|δ| ≥" in words
+    tiny = replace(both[0], values={**both[0].values, "least_clearance": 2.05e-15})
+    column = ComparedDesign(0, own, tiny, own.millimetres)
+    assert column.value(CATALOGUE["least_clearance"]) == 0.0
 
 
 def test_limits_in_force_are_listed_and_no_others() -> None:

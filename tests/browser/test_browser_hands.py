@@ -120,17 +120,27 @@ def test_command_is_run_by_the_palette_and_by_its_key_but_not_while_one_types(ta
     tab.wait_for(lambda: tab.page.evaluate(active) != "INPUT", "let go")
     press(tab, "g")
     tab.wait_for(lambda: not tab.state.view.grid, "no grid")
-    # The palette finds commands by their words.
+    # The search finds commands by their words.
     tab.page.get_by_role("button", name="Search").click()
     search = tab.page.get_by_placeholder("Search commands")
     search.fill("convex hull")
+    tab.page.get_by_text("Workspace › Convex hull").wait_for()
     press(tab, "Enter")
     tab.wait_for(lambda: tab.state.view.workspace.hull, "the hull")
-    search.wait_for(state="detached")
+    search.wait_for(state="hidden")
     press(tab, "ControlOrMeta+k")
     search.fill("show the parts")
     tab.page.get_by_text("Prototype › Show the parts").first.click()
     tab.wait_for(lambda: tab.state.view.drawn_as == "prototype", "the prototype")
+    # A text is found in its tab, which the arrows and Enter open.
+    press(tab, "ControlOrMeta+k")
+    search.fill("strokes too short")
+    tab.page.get_by_text("in Prototype", exact=True).wait_for()
+    press(tab, "ArrowUp")
+    press(tab, "ArrowDown")
+    press(tab, "Enter")
+    search.wait_for(state="hidden")
+    assert tab.page.get_by_role("tab", name="Prototype").get_attribute("aria-selected") == "true"
 
 
 def test_dialog_and_card_of_keys_close_by_a_key_by_a_click_beside_and_by_their_buttons(

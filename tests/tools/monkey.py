@@ -33,6 +33,7 @@ from server_clock import wait_until_drawn
 from socket_tab import SocketTab
 
 from explorer.app.features.designs.feature import SavedDesigns
+from explorer.app.features.help.search import RUN
 from explorer.app.features.paths.state import Paths, journey_of
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
@@ -284,11 +285,14 @@ class Monkey:
         self._did()
 
     def _trigger(self) -> None:
-        """Choose a command from the palette."""
+        """Choose a command from the search, or press the keys of one."""
         commands = list(self._gui._command_handle_from_uuid)
-        if commands:
+        label = self._random.choice(self.running.page.services.commands.all).label
+        if self._random.random() < 0.5:
+            self._tab.update(*press_update(self.running, RUN, label))
+        else:
             self._tab.send({"type": "CommandTriggerMessage", "uuid": self._random.choice(commands)})
-            self._did()
+        self._did()
 
     def _pull_handle(self) -> None:
         scene: Any = self.running.viser.scene

@@ -282,6 +282,7 @@ class Feature:
             a heading of it; "" for no button. Tabs that features share have that of the first.
         openers: Functions that open files, by a field that no other kind of file has, or by the
             suffix of files that are no JSON; a file with none of these fields is a design.
+        verdicts: The verdicts that its first tab gives, each with a sentence on what it means.
         feeds: Feeds, which request drawings from the process of the page; `FeedOf` declares one.
         later_feeds: Feeds whose requests come after those of all features' `feeds`, since nobody
             waits for their results while the scene changes.
@@ -295,6 +296,7 @@ class Feature:
     manual: str = ""
     tabs: tuple[Tab, ...] = ()
     bar: tuple[InBar, ...] = ()
+    verdicts: Mapping[str, str] = field(default_factory=dict[str, str])
     exports: tuple[FileExport, ...] = ()
     openers: Mapping[str, Opener] = field(default_factory=dict[str, Opener])
     scene: tuple[Callable[[Services], ScenePart], ...] = ()

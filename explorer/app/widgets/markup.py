@@ -21,9 +21,9 @@ def box(*parts: str) -> str:
     return f'<div class="ex-box">{"".join(parts)}</div>'
 
 
-def status(words: str, look: Look) -> str:
-    """Return the result of a panel in large words."""
-    return f'<div class="ex-status ex-{look}">{escape(words)}</div>'
+def status(words: str, look: Look, hint: str = "") -> str:
+    """Return the result of a panel in large words, with a sentence on its meaning."""
+    return f'<div class="ex-status ex-{look}"{_title(hint)}>{escape(words)}</div>'
 
 
 def caption(words: str, hint: str = "") -> str:

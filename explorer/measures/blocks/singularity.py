@@ -58,9 +58,8 @@ def margin_table(snapshot: Snapshot, unit: Unit | None = None) -> block.Table:
             block.Names("", [f"δ{number}" for number in (1, 2, 3)]),
             block.Column("margin", margins.tolist(), " units", size=reach, span=reach, wide=True),
             block.Column("margin", (unit.factor * margins).tolist(), name, size=size, span=size,
-                         hint="Zero where the mechanism is singular. δ1 and δ3 are distances, δ2 "
-                         "is the mutual moment of two lines, a distance times a sine. Its sign is "
-                         "that of the mode."),
+                         hint="How far the two flags are from meeting; zero where the mechanism is "
+                         f"singular. {MARGIN_KINDS}. Its sign is that of the mode."),
             block.Column("motion", motions, name, 5, span=size,
                          hint="To the nearest pose with δ = 0: the root-mean-square displacement "
                          "of b1 to b4 (Nawratil's metric)."),

@@ -95,8 +95,8 @@ class Search:
         if chosen.status == "infeasible" and 0.0 < self.largest_volume < demanded:
             asked, found = format_apart((demanded, self.largest_volume), 6, format_number)
             reason = (
-                f"no design within the bounds was found with a volume of {asked}; the largest "
-                f"found is {found}"
+                f"no design within the bounds was found with a volume of {asked} units³; the "
+                f"largest found is {found} units³"
             )
         run = Run(
             start=self.start,
@@ -298,7 +298,7 @@ class Search:
 
 
 def _missed_words(pair: UnprovenClearance) -> str:
-    place = f"({', '.join(map(format_number, pair.position.tolist()))})"
+    place = f"({', '.join(map(format_number, pair.position.tolist()))}) units"
     if pair.missed > 0.0:
         return f"not converged: {pair.name} is not kept everywhere, such as at {place}"
     words = f"not converged: {pair.name} is kept wherever it was computed, but not proven"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -261,3 +261,24 @@ def dock_above_in(
     internals: Any = anchor
     own: Any = panel_in(client, panel)
     own._set_position({"kind": "split", "anchor_uuid": internals._impl.uuid, "side": "above"})
+
+
+def contents_of(gui: viser.GuiApi) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield what stands on a page, each with the titles of its tab and folders, the tab first.
+
+    What is hidden, and what stands in a hidden folder, is left out. Gap: viser lists nothing.
+    """
+    internals: Any = gui
+    containers = internals._container_handle_from_uuid
+    for container in tuple(containers.values()):
+        titles, outer, is_shown = list[str](), container, True
+        while outer is not None:
+            # A tab stands in nothing that hides it, and folders in a tab or in other folders.
+            state = getattr(outer, "_impl", None)
+            title = getattr(outer, "_label", None) if state is None else outer.label
+            titles += [] if title is None else [str(title)]
+            is_shown = is_shown and (state is None or outer.visible)
+            outer = None if state is None else containers.get(state.parent_container_id)
+        for handle in tuple(container._children.values()) if is_shown else ():
+            if getattr(handle, "visible", True):
+                yield tuple(titles[::-1]), handle

@@ -136,9 +136,9 @@ window.explorer.fields ??= (() => {
     write.call(typing.field, typing.before);
     choose();
   };
-  // viser ignores keys pressed in fields.
-  const passToPage = ({ key, code, ctrlKey, metaKey, shiftKey }) => {
-    const init = { key, code, ctrlKey, metaKey, shiftKey, bubbles: true };
+  // viser ignores keys pressed in fields. Its commands go by the key, its camera by the place alone.
+  const passToPage = ({ key, ctrlKey, metaKey, shiftKey }) => {
+    const init = { key, ctrlKey, metaKey, shiftKey, bubbles: true };
     document.documentElement.dispatchEvent(new KeyboardEvent("keydown", init));
   };
   // A field takes the focus back with its next number if its page is not told of the focusout.
@@ -201,13 +201,14 @@ window.explorer.fields ??= (() => {
     const { target, key } = event;
     if (!typing || typing.field !== target || typing.isReplacing || event.isComposing) return;
     hold();
-    if ((event.ctrlKey || event.metaKey) && /^[zy]$/i.test(key)) {
+    const isForPage = event.ctrlKey || event.metaKey;
+    if (typing.isPending && isForPage && /^[zy]$/i.test(key)) {
       event.preventDefault();
       event.stopPropagation();
-      if (typing.isPending) giveUp();
-      else passToPage(event);
+      giveUp();
       return;
     }
+    if (typing.isPending && isForPage && /^s$/i.test(key)) enter();
     if (typing.isEdited && key === "Escape") {
       write.call(target, typing.first);
       enter();
@@ -263,6 +264,19 @@ window.explorer.fields ??= (() => {
     if (event.key !== "Enter" || event.isComposing || !isLine(event.target)) return;
     event.stopPropagation();
     event.target.blur();
+  });
+  // What these keys do for the whole page they do wherever the focus is; text that is being typed is
+  // the browser's to undo.
+  capture("keydown", (event) => {
+    const { target, key, ctrlKey, metaKey, isTrusted, defaultPrevented } = event;
+    if (!isTrusted || defaultPrevented || !(ctrlKey || metaKey) || !/^[zys]$/i.test(key)) return;
+    if (!/s/i.test(key)) {
+      const isTyped = line?.field === target && target.value !== line.before;
+      if (isTyped || !target.matches?.("input:not([type=search]), textarea, select")) return;
+    }
+    event.preventDefault();
+    event.stopPropagation();
+    passToPage(event);
   });
   capture("focusout", ({ target }) => {
     if (!line || line.field !== target) return;

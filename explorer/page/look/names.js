@@ -6,7 +6,6 @@ window.explorer.names ??= (() => {
     "[role=slider], input:not([type=hidden]):not([type=file]):not([type=checkbox]), textarea";
   // Names of buttons by their icon.
   const ICONS = {
-    "list-search": "Commands",
     adjustments: "Settings of the page",
     "arrow-back": "Back to the controls",
     maximize: "Expand plot",
@@ -56,9 +55,6 @@ window.explorer.names ??= (() => {
     window.explorer.stops?.();
     document.querySelectorAll(CONTROLS).forEach(nameControl);
     document.querySelectorAll("button").forEach(nameButton);
-    // viser's palette speaks of commands alone.
-    const search = document.querySelector(".mantine-Spotlight-search");
-    if (search) search.placeholder = "Search commands, pages and terms";
   };
   // Width of the widest panel at a side of the window, and room beside a hint, in pixels.
   const WIDEST = 420,

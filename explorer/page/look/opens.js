@@ -1,11 +1,9 @@
-// Opens what [data-opens=title] names: a tab of a panel, or a dialog; "commands" is the palette.
+// Opens what [data-opens=title] names: a tab of a panel, or a dialog.
 // Closes the dialog at Escape, at a click beside it, and at its button.
 window.explorer.opens ??= (() => {
   const DIALOG = "[data-floating-window][data-ex=dialog]",
     OPEN = `${DIALOG}[data-ex-open]`,
     CARD_CLOSE = "[data-ex=card] > .ex-closes";
-  // viser opens its palette at this key, which nothing on the server can press.
-  const PALETTE_KEY = { key: "k", code: "KeyK", ctrlKey: true, bubbles: true };
   const ENTER = { key: "Enter", code: "Enter", bubbles: true };
   const shade = document.createElement("div");
   shade.className = "ex-shade";
@@ -36,7 +34,7 @@ window.explorer.opens ??= (() => {
     dialog.setAttribute("aria-label", title);
     dialog.parentElement.append(shade);
     if (!dialog.querySelector(".ex-closes")) dialog.append(closeButton());
-    dialog.querySelector(".ex-closes").focus({ preventScroll: true });
+    dialog.querySelector("[type=search], .ex-closes").focus({ preventScroll: true });
   };
   const open = (title) => {
     const tabs = [...document.querySelectorAll("[data-dock-tab]")];
@@ -55,19 +53,15 @@ window.explorer.opens ??= (() => {
   };
   addEventListener("click", ({ target }) => {
     const title = target.closest?.("[data-opens]")?.dataset.opens;
-    if (title === "commands") {
-      document.documentElement.dispatchEvent(new KeyboardEvent("keydown", PALETTE_KEY));
-    } else if (title) open(title);
+    if (title) open(title);
   });
   // What a dialog was opened for is done: it leaves the view of the result.
   addEventListener("click", ({ target }) => {
     if (target.closest?.("[data-closes] [data-press]")) closeDialogs();
   });
   window.explorer.capture("keydown", ({ key, target }) => {
-    // The palette may lie over a dialog, and is closed first; a list in a dialog too.
-    const isOver = target.closest?.(
-      ".mantine-Spotlight-content, [aria-haspopup][aria-expanded=true]",
-    );
+    // A list in a dialog lies over it, and is closed first.
+    const isOver = target.closest?.("[aria-haspopup][aria-expanded=true]");
     if (key !== "Escape" || isOver) return;
     if (document.querySelector(OPEN)) closeDialogs();
     // In a field it discards what is typed.

@@ -1,6 +1,7 @@
-"""The command palette: all commands of the page, by name and by key.
+"""The commands of the page, by name and by key.
 
-It offers every button, every switch and some lists, as they are made, and what has no control.
+They are every button, every switch and some lists, as they are made, and what has no control; the
+search offers them by name.
 Keys are those of other 3D programs: 0, 1, 3 and 7 for the views, F to fit, H for home, letters for
 visible parts. None is a key of the browser, and W, A, S, D, Q, E and the arrows move the camera.
 """
@@ -8,13 +9,12 @@ visible parts. None is a key of the browser, and W, A, S, D, Q, E and the arrows
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import viser
-
-from explorer.page.widgets.assigning import Update
 
 # Separator of the parts of a command's name, from the tab to the option.
 STEP = " › "
@@ -37,7 +37,7 @@ MODIFIER_NAMES = {"cmd/ctrl": "Ctrl"}
 """Names of modifiers on the page; on a Mac the Command key does the same as Ctrl."""
 
 PALETTE_KEY = Key("K", "cmd/ctrl")
-"""The key that opens the palette, in viser."""
+"""The key that opens the search."""
 
 
 def shift(key: str) -> Key:
@@ -62,14 +62,13 @@ Run = Callable[[viser.ClientHandle], None]
 
 @dataclass(frozen=True)
 class Command:
-    """A command of the palette.
+    """A command of the page.
 
     Attributes:
         label: Unique name, from the tab to the option.
         does: Sentence on what it does.
         run: Function that runs it.
         is_ready: Function that tells whether it can run now.
-        stands_alone: Whether it has no control, which would decide whether it is ready.
         keys: Keys that run it.
     """
 
@@ -77,7 +76,6 @@ class Command:
     does: str
     run: Run
     is_ready: Callable[[], bool] = lambda: True
-    stands_alone: bool = True
     keys: tuple[Key, ...] = ()
 
 
@@ -127,7 +125,6 @@ class Commands:
                 does,
                 run,
                 lambda: control.visible and not control.disabled,
-                stands_alone=False,
                 keys=keys,
             )
         )
@@ -152,67 +149,29 @@ class WithCommands(Protocol):
 
 
 class Palette:
-    """The palette, which must be made after all controls.
+    """The keys of the commands; it must be made after all controls.
 
     Args:
-        server: Server whose browsers have the palette.
-        commands: The commands that stay in it.
+        server: Server whose browsers have the keys.
+        commands: The commands that stay.
 
     Raises:
         ValueError: Two commands have one name.
     """
 
     def __init__(self, server: viser.ViserServer, commands: tuple[Command, ...] = ()) -> None:
-        self._gui = server.gui
         self.commands = commands
-        self._registered: list[tuple[Command, viser.CommandHandle]] = []
         for command in commands:
             if sum(command.label == other.label for other in commands) > 1:
                 raise ValueError(f"two commands are called {command.label!r}")
-            for index, key in enumerate(command.keys or (None,)):
+            for key in command.keys:
                 # viser's commands have one key each.
-                label = command.label if index == 0 else f"{command.label}  ({key})"
-                self._registered.append((command, self._add_to_page(command, label, key)))
-        # By group: the commands that come and go, and their handles by label.
-        self._passing: dict[str, tuple[tuple[Command, ...], dict[str, viser.CommandHandle]]] = {}
+                untyped: Any = key
+                label, hotkey, modifier = f"{command.label}  ({key})", untyped.key, untyped.modifier
+                handle = server.gui.add_command(label, hotkey=hotkey, modifier=modifier)
+                handle.on_trigger(partial(_run, command))
 
-    def offer(self, group: str, passing: tuple[Command, ...]) -> None:
-        """Offer these commands besides those that stay; remove the others of the group.
 
-        The same object as in the last call changes nothing and takes no time.
-        """
-        before, handles = self._passing.get(group, ((), {}))
-        if passing is before:
-            return
-        self._passing[group] = passing, handles
-        commands = {command.label: command for command in passing}
-        for label in handles.keys() - commands.keys():
-            handles.pop(label).remove()
-        for label in commands.keys() - handles.keys():
-            handles[label] = self._add_to_page(commands[label], label, None)
-
-    def updates(self, *, controls: bool) -> Iterator[Update]:
-        """Yield the updates that enable the commands that are ready, and disable the others.
-
-        Commands of controls stay as they are unless any control was enabled, disabled, shown or
-        hidden.
-        """
-        for command, handle in self._registered:
-            if controls or command.stands_alone:
-                yield handle, "disabled", not command.is_ready()
-
-    def _add_to_page(self, command: Command, label: str, key: Key | None) -> viser.CommandHandle:
-        untyped: Any = key
-        handle = self._gui.add_command(
-            label,
-            description=command.does,
-            hotkey=None if key is None else untyped.key,
-            modifier=None if key is None else untyped.modifier,
-        )
-
-        @handle.on_trigger
-        def _(event: viser.CommandEvent) -> None:
-            if event.client is not None and command.is_ready():
-                command.run(event.client)
-
-        return handle
+def _run(command: Command, event: viser.CommandEvent) -> None:
+    if event.client is not None and command.is_ready():
+        command.run(event.client)

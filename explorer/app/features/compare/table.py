@@ -63,8 +63,10 @@ class ComparedDesign:
         return COMPARED[self.number]
 
     def own_value(self, measure: Measure) -> float | None:
-        """Return a value in the design's own units; None if it is unknown."""
-        return None if self.measured is None else self.measured[measure.name]
+        """Return a value in the design's own units, rounding as 0; None if it is unknown."""
+        value = None if self.measured is None else self.measured[measure.name]
+        size = self.design.reach**measure.power if measure.power else 0.0
+        return None if value is None else number_text.drop_rounding(value, size)
 
     def has(self, measure: Measure) -> bool:
         """Whether the design has what a measure needs, such as a load."""

@@ -17,6 +17,7 @@ import viser
 from explorer.app.features.feature import Feature, FileExport, Services, Tab
 from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
+from explorer.app.session.history import HistoryStep
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, MarkSaved, Open, SetName
 from explorer.app.state.frame import Frame
@@ -33,8 +34,10 @@ from explorer.page.browser.viser_gaps import element_id, run_script, run_script_
 from explorer.page.look import call_script, read_script
 from explorer.page.session.latest import LatestWins
 from explorer.page.widgets.assigning import Update
-from explorer.page.widgets.palette import Command, Run
+from explorer.page.widgets.palette import Command, Key, Run
 
+# Ctrl+S saves in the library what a browser would save as a page.
+KEYS = {"Save": (Key("S", "cmd/ctrl"),)}
 # Byte order marks, the zeros of UTF-16, and blanks.
 BEFORE_JSON = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
 
@@ -54,6 +57,7 @@ class SavedDesigns:
         entries: The saved designs, the last saved first.
         commands: Those that open them.
         last_deleted: Name of the design that can be brought back; None if there is none.
+        deleted_at: Step of the session after which a design was deleted; None if none was.
     """
 
     def __init__(self, services: Services) -> None:
@@ -65,6 +69,7 @@ class SavedDesigns:
         self.entries: tuple[LibraryFile, ...] = ()
         self.commands: tuple[Command, ...] = ()
         self.last_deleted: str | None = None
+        self.deleted_at: HistoryStep | None = None
         self._requests: LatestWins[_Request] = LatestWins(self._do_all, "designs")
         services.at_end(self._requests.stop)
         self.refresh()
@@ -113,10 +118,16 @@ class SavedDesigns:
 
     def delete(self, name: str, who: Who = None) -> None:
         """Delete a saved design; `restore` brings it back."""
-        self._post(lambda: self._library.delete(name), who)
+
+        def work() -> None:
+            self._library.delete(name)
+            self.deleted_at = self._session.history.step
+
+        self._post(work, who)
 
     def restore(self, who: Who = None) -> None:
         """Restore the design that was deleted or replaced last."""
+        self.deleted_at = None
         self._post(self._library.restore, who)
 
     def take(self, data: bytes, name: str, client: viser.ClientHandle | None = None) -> None:
@@ -251,7 +262,8 @@ class DesignsPanel:
         )
         self._buttons.on_click(lambda event: actions[self._buttons.value](event.client_id))
         for option, act in actions.items():
-            services.commands.offer(self._buttons, _run(act), option=option)
+            keys = KEYS.get(option, ())
+            services.commands.offer(self._buttons, _run(act), option=option, keys=keys)
         self.status = gui.add_html("")
         upload = gui.add_upload_button(
             "Open a file …",

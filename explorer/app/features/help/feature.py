@@ -8,7 +8,7 @@ from html import escape
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
-from explorer.app.features.help.manual import ManualReader
+from explorer.app.features.help.search import TITLE, SearchDialog
 from explorer.app.features.help.tour import TourGuide
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import MANUAL, open_button, press_button
@@ -42,9 +42,9 @@ class HelpButtons:
         for name, hint in HINTS.items():
             buttons.offer(f"Page › {name}", hint, PRESS, name, keys=KEYS.get(name, ()))
         commands = open_button(
-            "commands",
+            TITLE,
             f"Search {keycap(str(palette.PALETTE_KEY))}",
-            hint="Search commands, the manual and the terms of the field.",
+            hint="Search commands, all that stands on the page, and the manual.",
             class_name="ex-tool ex-commands",
         )
         theme = press_button(
@@ -90,7 +90,7 @@ def keycap(key: str) -> str:
 
 def keys_table(commands: Iterable[palette.Command]) -> str:
     """Return all keys as HTML, in the groups of their commands and in two columns."""
-    groups = {"Page": [_row("Search commands and manual", keycap(str(palette.PALETTE_KEY)))]}
+    groups = {"Page": [_row("Search commands, page and manual", keycap(str(palette.PALETTE_KEY)))]}
     for command in commands:
         if command.keys:
             caps = " ".join(keycap(str(key)) for key in command.keys)
@@ -108,8 +108,7 @@ def _row(words: str, caps: str) -> str:
 
 HELP = Feature(
     "help",
-    tabs=(Tab("dialog", "Help", HelpDialog),),
+    tabs=(Tab("dialog", "Help", HelpDialog), Tab("dialog", TITLE, SearchDialog)),
     bar=(InBar("right", HelpButtons),),
     runners=(TourGuide,),
-    passing=lambda services: services.get(ManualReader).commands,
 )

@@ -15,7 +15,7 @@ from explorer.app.widgets.buttons import MANUAL, press_button
 from explorer.files.packaged import list_pages, read_page
 from explorer.page.browser.viser_gaps import run_script_in, show_value
 from explorer.page.look import read_script
-from explorer.page.widgets.palette import STEP, Command
+from explorer.page.widgets.palette import STEP
 
 CLOSE = "help.close"
 # Place and size of the manual's panel, in pixels.
@@ -33,7 +33,7 @@ SYMBOL = re.compile(r",? (?=[α-ω])")
 def list_entries() -> Iterator[tuple[str, str, str]]:
     """Yield pages, headings and terms of the manual as the search finds them.
 
-    Each has its name in the palette, a sentence, and what opens it, see `MANUAL`.
+    Each has its name in the search, a sentence, and what opens it, see `MANUAL`.
     """
     for title, file in PAGES.items():
         text, name = read_page(file), f"Manual{STEP}{title}"
@@ -62,10 +62,6 @@ class ManualReader:
         services.buttons.on(MANUAL, self.open, values={target for _, _, target in list_entries()})
         services.buttons.on(CLOSE, lambda _, client: self._close(client))
         services.server.on_client_disconnect(self._forget)
-        self.commands = tuple(
-            Command(label, does, lambda client, target=target: self.open(target, client))
-            for label, does, target in list_entries()
-        )
 
     def open(self, target: str, client: viser.ClientHandle) -> None:
         """Open a page of the manual in a browser, at its heading or term if the target has one."""

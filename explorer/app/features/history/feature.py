@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 import viser
 
+from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.workspace.feeds import VOLUME_FEED, volume_request
 from explorer.app.features.workspace.work import MeasuredVolume, Selection, measure_volume
@@ -116,14 +117,18 @@ def author(services: Services, step: HistoryStep) -> str:
 
 
 class UndoButtons:
-    """Undo, redo, and the button that opens the list of all steps."""
+    """Undo, redo, and the button that opens the list of all steps.
+
+    Undo after a saved design was deleted brings that back: it is no step of the session.
+    """
 
     def __init__(self, services: Services) -> None:
         self._session, self._services = services.session, services
         services.server.on_client_connect(
             lambda client: run_script_in(client, read_script("authors", client.client_id))
         )
-        services.do_on_press(MOVE, MOVES.__getitem__, MOVES)
+        self._saved = None if services.user_data is None else services.get(SavedDesigns)
+        services.buttons.on(MOVE, self._move, values=MOVES)
         for name in MOVES:
             # Always ready: a key that is pressed before the page knows of the last step counts.
             hint = f"{name} the last step."
@@ -141,11 +146,26 @@ class UndoButtons:
         )
         return f'<span class="ex-undo">{buttons}{steps}</span>'
 
+    def _move(self, name: str, client: viser.ClientHandle) -> None:
+        if name == "Undo" and self._saved is not None and self._deleted is not None:
+            self._saved.restore(client.client_id)
+        else:
+            self._session.do(MOVES[name], who=client.client_id)
+
+    @property
+    def _deleted(self) -> str | None:
+        """Name of the saved design that was deleted last, if nothing was done since."""
+        saved = self._saved
+        is_last = saved is not None and saved.deleted_at is self._session.history.step
+        return saved.last_deleted if saved is not None and is_last else None
+
     def _button(self, name: str, history: History, *, is_busy: bool) -> str:
         # The step that "Undo" or "Redo" goes over.
         at = history.at if name == "Undo" else history.at + 1
         step = history.steps[at] if 0 < at < len(history.steps) else None
-        words = None if step is None else step.words
+        words, deleted = None if step is None else step.words, self._deleted
+        if name == "Undo" and deleted is not None:
+            step, words, is_busy = None, f"Delete {deleted}", False
         hint = f"{name}: {words}." if words is not None else f"Nothing to {name.lower()}."
         return press_button(
             MOVE,

@@ -170,5 +170,10 @@ LEGS = Feature(
     "legs",
     tabs=(Tab("analyse", "Workspace", ClearancePanel),),
     bar=(InBar("middle", lambda _: clearance_figure),),
+    verdicts={
+        "Legs are clear": "No two legs meet, their radii included.",
+        "Legs touch": "It is not certain that two legs stay apart, their radii included.",
+        "Legs collide": "Two legs would be in one place, their radii included.",
+    },
     scene=(ClearanceScene, SweptTetrahedra),
 )

@@ -216,6 +216,13 @@ LOADS = Feature(
         Tab("analyse", "Loads", precision.PrecisionPanel),
     ),
     bar=(InBar("middle", load_figure),),
+    verdicts={
+        "Holds the load": "No part bears more than its limit.",
+        "Does not hold the load": "A part would bear more than its limit.",
+        "No limits are given": "The design states no largest force of an actuator or a part.",
+        "The design states no errors": "No errors of actuators or dimensions are given.",
+        "Errors are infinite here": "The pose is singular: the tool moves with all locked.",
+    },
     exports=(precision.TOLERANCES,),
     scene=(ForcesScene, LoadHandle, ErrorEllipsoidScene, DeflectedScene),
     later_feeds=(load.WEIGHTS_FEED, load.nearest_feed, precision.BUDGET_FEED),

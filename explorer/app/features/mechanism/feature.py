@@ -318,6 +318,10 @@ MECHANISM = Feature(
         Tab("build", "Design", DesignPanel, viser.Icon.RULER_2),
     ),
     bar=(InBar("left", DesignName), InBar("middle", lambda _: limits_figure)),
+    verdicts={
+        "Limits kept": "The pose keeps all limits of the design.",
+        "Limits broken": "The pose is outside limits of the design, such as a length of a leg.",
+    },
     # Bodies come first: they make the platform's frame, to which others attach.
     scene=(Bodies, Flags, Legs, TwinLegs, Tetrahedra, Leaves, Gaps, Labels, Ghosts, DragHandle),
     commands=(

@@ -13,7 +13,13 @@ from explorer.app.features.optimise.actions import SetObjective
 from explorer.app.features.optimise.buttons import ACCEPT, add_buttons, button
 from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchRun
-from explorer.app.features.optimise.words import goal_unit, result_words, search_notice
+from explorer.app.features.optimise.words import (
+    VERDICTS,
+    goal_unit,
+    result_words,
+    search_notice,
+    search_words,
+)
 from explorer.app.features.optimise.work import complete_request
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.inputs.bindings import At, ControlBinding
@@ -49,8 +55,6 @@ FREE = {
 }
 FREE_LABELS = {YAW: "yaw of home"}
 STEP = 0.001
-COLUMNS = '<div class="ex-columns"></div>'
-"""Markup that makes the stylesheet put what follows it in a tab side by side."""
 # Width and height of a chart with its axes, and its place in that, in pixels.
 SIZE, PLACE = "0 0 280 120", (48.0, 222.0, 6.0, 78.0)
 
@@ -62,7 +66,8 @@ class OptimisePanel:
         gui = services.gui
         add_buttons(services)
         self._controls = Controls(services)
-        gui.add_html(COLUMNS)
+        # By its class the stylesheet puts what follows it side by side, and keeps it in sight.
+        self._search = gui.add_html("")
         with gui.add_folder("Problem"):
             self._add_problem()
             title = "Free variables"
@@ -76,6 +81,8 @@ class OptimisePanel:
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
         yield from self._controls.updates(frame)
+        search = f'<div class="ex-columns">{search_words(frame.state)}</div>'
+        yield self._search, "content", search
         yield self._result, "content", result_words(frame.state, self._verdict.html())
         yield from self._plots.updates(frame.state)
 
@@ -231,6 +238,7 @@ OPTIMISE = Feature(
     manual="optimise.md#On the page",
     tabs=(Tab("work", "Optimise", OptimisePanel, viser.Icon.SPARKLES),),
     bar=(InBar("right", lambda _: search_chip),),
+    verdicts=VERDICTS,
     exports=(
         FileExport(
             "Record of the search",

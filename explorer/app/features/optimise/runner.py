@@ -19,9 +19,7 @@ from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.jobs.jobs import LongJob
-from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import (
-    OBJECTIVE_SYMBOLS,
     Iterate,
     Outcome,
     Settings,
@@ -181,6 +179,5 @@ def result_of(run: SearchRun, ending: Outcome | str, iterates: tuple[Iterate, ..
     if not iterates:
         return SearchResult("cancelled", "cancelled before the first iterate")
     found = min(iterates, key=Trail(run.problem).rank)
-    value = f"{OBJECTIVE_SYMBOLS[run.problem.objective]} = {format_number(found.objective, 6)}"
-    message = f"cancelled: {value} is the best of {len(iterates)} iterates"
+    message = f"cancelled: {REACHED} is the best of {len(iterates)} iterates"
     return SearchResult("cancelled", message, found, starts=iterates[-1].run + 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -31,8 +32,21 @@ TITLES = {
     "stalled": "Stalled",
     "cancelled": "Cancelled: the best so far",
 }
+MEANINGS = {
+    "converged": "The new design keeps all demands, and none nearby is better.",
+    "not converged": "The search ended before it was sure, or a demand is not proven.",
+    "infeasible": "The search found no design that keeps what was demanded.",
+    "stalled": "The demands are kept, but the search found no way to a better design.",
+    "cancelled": "The search was ended early, and its best design is kept.",
+}
+VERDICTS = {title: MEANINGS[status] for status, title in TITLES.items()}
+"""The verdicts on a search, each with its meaning."""
 # Limits of refusals without a problem that could be searched.
 NO_PROBLEM = ("", problems.SWING_LIMIT, problems.MAXIMA)
+
+# Numbers in the words of a search, and those that are lengths or volumes, with the power of these.
+NUMBER = re.compile(r"−?\d+(?:,\d{3})*(?:\.\d+)?")
+IN_UNITS = re.compile(r"(\([^()]*\)|−?\d[\d,.]*) units(³?)")
 
 
 @dataclass(frozen=True)
@@ -91,21 +105,19 @@ def goal_unit(objective: problems.ObjectiveName, state: State) -> Unit:
     return CATALOGUE[GOALS[objective]].unit_in(state.unit, state.design.reach**3)
 
 
-def result_words(state: State, built: str = "") -> str:
-    """Return the column of the search as HTML: what can be done, how it goes, what it found.
+def search_words(state: State) -> str:
+    """Return how the search goes or ended, and its buttons, as HTML, which stay in sight.
 
-    Below what it found stands whether that can be built, as HTML.
     At most one of its buttons is filled: what prevents a search comes first, then the answer to
     a search that succeeded, then the search itself.
     """
     run, notice = Optimisation.of(state).run, search_notice(state)
     if notice is not None and Optimisation.of(state).is_on:
-        return markup.box(
+        return (
             f'<div class="ex-line"><div class="ex-strong">{escape(notice.title)}</div>'
-            f"{buttons.button(buttons.CANCEL, state)}</div>",
-            f'<div class="ex-dim ex-cut">{escape(notice.text) or "&nbsp;"}</div>',
-            "" if notice.share is None else markup.meter(100.0 * notice.share),
-            limits_table(state.design, state.unit),
+            f"{buttons.button(buttons.CANCEL, state)}</div>"
+            f'<div class="ex-dim ex-cut">{escape(notice.text) or "&nbsp;"}</div>'
+            + ("" if notice.share is None else markup.meter(100.0 * notice.share))
         )
     refusals, limits = work.find_refusals(state), work.liftable_limits(state)
     remedies = "".join(
@@ -135,18 +147,16 @@ def result_words(state: State, built: str = "") -> str:
     else:
         accept = buttons.button(buttons.ACCEPT, state, is_main=is_success and not remedies)
         acts = accept + buttons.button(buttons.REVERT, state) + acts
-    found = ""
-    if run is not None and has_result:
-        compared = comparison_table(run, state.view)
-        found = f'<div class="ex-after">{built}</div>{compared}'
-    return markup.box(
-        verdict,
-        refused_words(why, refusals, limits) if refusals else "",
-        f'<div class="ex-flow ex-before">{remedies}</div>' if remedies else "",
-        f'<div class="ex-flow ex-before">{acts}</div>',
-        found,
-        limits_table(state.design, state.unit),
-    )
+    refused = refused_words(why, refusals, limits) if refusals else ""
+    return f'{verdict}{refused}<div class="ex-flow">{remedies}{acts}</div>'
+
+
+def result_words(state: State, built: str = "") -> str:
+    """Return what a search found as HTML, whether that can be built, and the limits in force."""
+    run, found = Optimisation.of(state).run, ""
+    if run is not None and run.best is not None and not Optimisation.of(state).is_on:
+        found = f'<div class="ex-before">{built}</div>{comparison_table(run, state.view)}'
+    return markup.box(found, limits_table(state.design, state.unit))
 
 
 def refused_words(body: str, refusals: Sequence[Conflict], limits: Sequence[str]) -> str:
@@ -164,10 +174,13 @@ def verdict_words(state: State, run: SearchRun, verdict: SearchResult) -> str:
         return markup.alert(
             "No result", f"{markup.sentence(verdict.message)} Your design is as it was."
         )
+    if verdict.best is not None and state.design.variables != verdict.best.design.variables:
+        return markup.dim("The design was changed by hand since the search.")
     title = "Cancelled" if verdict.best is None else TITLES[verdict.status]
     message = verdict.message.removeprefix(f"{verdict.status}: ")
     if verdict.best is not None:
         message = message.replace(REACHED, _reached_text(run.problem, verdict.best, state))
+    message = IN_UNITS.sub(lambda found: _in_unit_of(state, found[1], found[2]), message)
     remarks: list[str] = []
     if verdict.starts > 1:
         remarks.append(f"{verdict.starts} starts, {verdict.converged} converged")
@@ -175,13 +188,22 @@ def verdict_words(state: State, run: SearchRun, verdict: SearchResult) -> str:
         remarks.append(f"{format_number(verdict.seconds, 2)} s")
     if run.accepted:
         remarks.append("accepted")
-    if verdict.best is not None and state.design.variables != verdict.best.design.variables:
-        remarks.append("changed by hand since")
+    look = "within" if verdict.status == "converged" else "beyond"
     return (
-        f"{markup.status(title, 'within' if verdict.status == 'converged' else 'beyond')}"
-        f'<div class="ex-before">{escape(markup.sentence(message))} '
+        f"{markup.status(title, look, MEANINGS[verdict.status])}"
+        f"<div>{escape(markup.sentence(message))} "
         f'<span class="ex-dim">{" · ".join(remarks)}</span></div>'
     )
+
+
+def _in_unit_of(state: State, numbers: str, power: str) -> str:
+    """Return numbers in design units, or a power of them, as text in the unit of a state."""
+    unit = state.unit_of(3 if power else 1)
+
+    def number(found: re.Match[str]) -> str:
+        return unit.number(float(found[0].replace(",", "").replace("−", "-")))
+
+    return f"{NUMBER.sub(number, numbers)} {unit.name}"
 
 
 def comparison_table(run: SearchRun, view: View) -> str:
@@ -208,8 +230,9 @@ def _comparison_row(problem: problems.Problem, name: str, columns: Sequence[Comp
     if after is not None:
         pairs = {"least_clearance": after.nearest, "demanded_clearance": after.demanded_nearest}
         if name == "demanded_clearance":
-            unit = columns[-1].unit
-            label += f", |δ| ≥ {unit.text(after.demanded_margin or 0.0, 3)}"
+            # The unit of the row follows.
+            least = columns[-1].unit.number(after.demanded_margin or 0.0, 3)
+            label += f", |δ| ≥ {least}"
     if legs := pairs.get(name):
         hint += f"; in the new design that of legs {legs[0]} and {legs[1]}"
     look = "ex-strong" if name == GOALS[problem.objective] else ""

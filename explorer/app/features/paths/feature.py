@@ -152,6 +152,11 @@ PATHS = Feature(
     manual="singularity.md#Paths",
     tabs=(Tab("work", "Paths", PathsPanel, viser.Icon.ROUTE),),
     bar=(InBar("right", lambda _: path_chip),),
+    verdicts={
+        "No singular pose": "The path crosses no singular pose.",
+        "Singular once": "The path goes through a singular pose, where the platform is not held.",
+        "No path": "No path was found that keeps what was asked for.",
+    },
     scene=(PathScene,),
     later_feeds=(DRIVES_FEED,),
     runners=(PathRunner,),

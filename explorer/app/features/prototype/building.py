@@ -16,7 +16,8 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import with_machine
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import figure, press_button
-from explorer.app.widgets.markup import row, sentence, status, table
+from explorer.app.widgets.markup import dim, row, sentence, status, table
+from explorer.measures.blocks.block import Look
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.motion.chains import LEGS
 from explorer.numerics.number_text import format_decimals
@@ -27,6 +28,13 @@ MEND = "prototype.mend"
 FITTING, STROKES = "fitting", "strokes"
 """The kinds of repair: unit and home for parts that do not fit, or limits beyond the strokes."""
 STROKES_WORDS = "Limit the lengths to the strokes"
+VERDICTS = {
+    "Buildable": "The parts fit into one another, and each leg makes all lengths of its limits.",
+    "Not buildable": "Some parts do not fit into one another, or into the room at a joint.",
+    "Strokes too short": "A leg cannot make all lengths that its limits allow: a rod in its "
+    "cylinder at most doubles the length.",
+}
+"""The verdicts, each with its meaning."""
 STROKES_HINT = (
     "Set the limits of the lengths to what a rod in its cylinder reaches; the workspace may shrink."
 )
@@ -59,6 +67,8 @@ class BuildVerdict:
 
     def html(self) -> str:
         """Return whether the machine can be built, with the press that mends it."""
+        if not (self._feed.is_current or self._feed.problem):
+            return f'<div class="ex-status">{dim("Checking …")}</div>'
         return html_of(self._feed, verdict_words, "The parts could not be sized")
 
     def in_bar(self, _: Frame) -> str:
@@ -67,6 +77,8 @@ class BuildVerdict:
         if built is None or not (built.problems or built.short_legs):
             return ""
         words = "no" if built.problems else "strokes too short"
+        if not self._feed.is_current:
+            return figure("Prototype", "Buildable", "…", hint="The new design is being checked.")
         clauses = (*built.problems, built.advice) if built.problems else (strokes_problem(built),)
         hint = " ".join(map(sentence, clauses))
         return figure("Prototype", "Buildable", words, hint=hint, look="ex-beyond")
@@ -99,7 +111,7 @@ def mend_words(built: Buildability) -> str:
 def verdict_words(built: Buildability) -> str:
     """Return whether a machine can be built, what is wrong, and the press that mends it."""
     if not built.problems and not built.short_legs:
-        return status("Buildable", "within")
+        return _status("Buildable", "within")
     if built.problems:
         head, problems, press = "Not buildable", [*built.problems], ""
         if built.remedy is None:
@@ -111,7 +123,11 @@ def verdict_words(built: Buildability) -> str:
         can_limit = built.within_strokes is not None
         press = _button(STROKES, STROKES_WORDS, STROKES_HINT) if can_limit else ""
     words = escape(" ".join(map(sentence, problems)))
-    return f"{status(head, 'beyond')}<div>{words}</div>{press}"
+    return f"{_status(head, 'beyond')}<div>{words}</div>{press}"
+
+
+def _status(verdict: str, look: Look) -> str:
+    return status(verdict, look, VERDICTS[verdict])
 
 
 def strokes_problem(built: Buildability) -> str:

@@ -10,7 +10,12 @@ import viser
 from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab, show_html
 from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype import work
-from explorer.app.features.prototype.building import BUILD_FEED, BuildVerdict, strokes_table
+from explorer.app.features.prototype.building import (
+    BUILD_FEED,
+    VERDICTS,
+    BuildVerdict,
+    strokes_table,
+)
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, PartsFeed, parts_to_draw
 from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
@@ -251,6 +256,7 @@ PROTOTYPE = Feature(
     manual="prototype-and-export.md",
     tabs=(Tab("analyse", "Prototype", PrototypePanel, viser.Icon.ENGINE),),
     bar=(InBar("middle", lambda services: services.get(BuildVerdict).in_bar),),
+    verdicts=VERDICTS,
     exports=(
         FileExport(
             "Mechanism",

@@ -230,6 +230,7 @@ REQUIREMENT = Feature(
     "requirement",
     manual="requirements.md",
     tabs=(Tab("dialog", words.TITLE, RequirementPanel),),
+    verdicts=words.VERDICTS,
     bar=(InBar("left", lambda _: lambda __: OPENS), InBar("left", Checklist)),
     scene=(RequiredBox,),
     later_feeds=(CHECK_FEED,),

@@ -25,6 +25,17 @@ OPEN, RELAX, GO, DROP = "required.open", "required.relax", "required.go", "requi
 WIDTH, HEIGHT, ROOM = 300.0, 220.0, 14.0
 
 
+KEPT, IMPOSSIBLE = "Requirement kept", "No machine can do this"
+NOT_FOUND = "No machine was found"
+VERDICTS = {
+    KEPT: "The design does all that the requirement asks for, over its whole box.",
+    "Demands missed": "The design does not do some of what the requirement asks for.",
+    IMPOSSIBLE: "It is proven that no machine of this kind keeps the requirement.",
+    NOT_FOUND: "The search ended without a machine that keeps the requirement.",
+}
+"""The verdicts, each with its meaning."""
+
+
 @lru_cache(maxsize=16)
 def picture(design: Design) -> str:
     """Return a machine at home with its required box, as SVG."""
@@ -48,9 +59,9 @@ def result(found: FoundDesigns | None, *, is_searching: bool) -> Iterator[str]:
         cards = "".join(_card(i, one) for i, one in enumerate(found.designs))
         yield f'<div class="ex-machines" data-closes>{cards}</div>'
     if found.impossible:
-        yield markup.alert("No machine can do this", _sentences(*found.impossible))
+        yield markup.alert(IMPOSSIBLE, _sentences(*found.impossible))
     elif not found.designs and not is_searching:
-        yield markup.alert("No machine was found", _sentences("relax a demand"))
+        yield markup.alert(NOT_FOUND, _sentences("relax a demand"))
     elif found.bound_mm > 0.0:
         least = round_down(found.bound_mm)
         yield f'<div class="ex-dim">No machine has legs below {least} mm.</div>'
@@ -96,7 +107,7 @@ def checklist(check: RequirementCheck | None, problem: str, look: str) -> str:
     head, rows = markup.dim(escape(problem) or "Checking …"), ""
     if check is not None:
         missed = f"{len(check.missed)} of {len(check.demands)} demands missed"
-        words, level = ("Requirement kept", "within") if check.kept else (missed, "beyond")
+        words, level = (KEPT, "within") if check.kept else (missed, "beyond")
         head = f'<b class="ex-{level}">{words}</b>'
         rows = "".join(map(_demand_row, check.demands))
     title = open_button(TITLE, head, hint="Open the requirement.")

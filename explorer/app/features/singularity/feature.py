@@ -28,9 +28,9 @@ from explorer.export.drawings.markup import as_html, circle, element
 from explorer.measures.blocks import singularity as blocks
 from explorer.measures.blocks.block import Column, Facts, Statement, head_of
 from explorer.measures.blocks.commands import pose_command
-from explorer.measures.verdict import DISTANCE_SHARE, warnings
+from explorer.measures.verdict import DISTANCE_SHARE, MEANINGS, TITLES, warnings
 from explorer.mechanism.folds import FOLD_LINES, FOLDS
-from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
+from explorer.mechanism.margins import INCIDENCES, MARGIN_WORDS, TETRAHEDRA, signs_of
 from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import format_decimals, format_fitted
 from explorer.page.widgets.assigning import Updates
@@ -106,7 +106,7 @@ class SingularityPanel:
 def summary(frame: Frame, corner: str = "") -> str:
     """Return the verdict, its reason and the freedoms as HTML, with a button in the corner."""
     verdict, unit = frame.verdict, frame.state.unit
-    look, hint = blocks.LOOKS[verdict.kind], blocks.VERDICT_HINT
+    look, hint = blocks.LOOKS[verdict.kind], f"{MEANINGS[verdict.kind]} {blocks.VERDICT_HINT}"
     answer = Statement(verdict.title, verdict.reason(unit), look, hint=hint)
     shows = {f"show {number}": scene.show_button(number) for number in (1, 2, 3)}
     return render([answer, *blocks.freedoms(frame.snapshot, unit)], shows, corner=corner)
@@ -149,7 +149,9 @@ def distance_table(frame: Frame) -> str:
 def _margin(frame: Frame, index: int, texts: tuple[str, ...]) -> str:
     snapshot, level = frame.snapshot, frame.verdict.levels[index]
     colour = colours.proximity_colour(level)
-    hint = f"{INCIDENCES[index]}, where the tetrahedron {' '.join(TETRAHEDRA[index])} is flat"
+    meaning = f"δ{index + 1}: {MARGIN_WORDS[index]}."
+    flat = " ".join(TETRAHEDRA[index])
+    hint = f"Zero with {INCIDENCES[index]}, where the tetrahedron {flat} is flat"
     go = press_button(
         GO,
         index + 1,
@@ -164,7 +166,8 @@ def _margin(frame: Frame, index: int, texts: tuple[str, ...]) -> str:
     share = min(100.0, 100.0 * level / colours.FAR_WARNINGS)
     numbers = "".join(f"<span>{text}</span>" for text in texts)
     return (
-        f'<div class="ex-margin-row" data-hover="{HOVER}" data-value="{index + 1}">'
+        f'<div class="ex-margin-row" data-hover="{HOVER}" data-value="{index + 1}" '
+        f'title="{meaning}">'
         f"{fold_dial(frame, index)}<div{' class=ex-strong' if is_nearest else ''}>"
         f"{margin_name(index + 1)}{numbers}{go}</div>"
         f'<div class="ex-danger" title="{escape(hint)}">{swatch(colour)}'
@@ -370,6 +373,7 @@ SINGULARITY = Feature(
     manual="singularity.md#Verdict",
     tabs=(Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),),
     bar=(InBar("middle", lambda _: distance_figure),),
+    verdicts={TITLES[kind]: meaning for kind, meaning in MEANINGS.items()},
     scene=(scene.NearestGhost, scene.EllipsoidScene, scene.BallScene, scene.FreeMotion),
     later_feeds=(work.STRATA_FEED,),
     commands=(

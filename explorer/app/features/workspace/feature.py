@@ -320,6 +320,11 @@ WORKSPACE = Feature(
     manual="workspace.md",
     tabs=(Tab("analyse", "Workspace", WorkspacePanel, viser.Icon.SPHERE),),
     bar=(InBar("middle", volume_figure),),
+    verdicts={
+        "The workspace is empty": "No position keeps all limits in this orientation.",
+        "No position holds the load": "At every position a part bears more than its limit.",
+        "Nothing is accessible": "The position itself breaks a limit: no move begins there.",
+    },
     exports=(
         FileExport(
             "Workspace",
