@@ -27,11 +27,12 @@ def entries(running: Running) -> list[Entry]:
 def texts_on(running: Running) -> Iterator[str]:
     """Yield every text that stands on the page, its markup cut at each tag."""
     gui: Any = running.viser.gui
-    for container in gui._container_handle_from_uuid.values():
-        is_hidden = isinstance(container, viser.GuiFolderHandle) and not container.visible
-        if is_hidden or getattr(container, "_label", "") == TITLE:
+    containers: list[Any] = list(gui._container_handle_from_uuid.values())
+    for container in containers:
+        if not getattr(container, "visible", True) or getattr(container, "_label", "") == TITLE:
             continue
-        for handle in container._children.values():
+        handles: list[Any] = list(container._children.values())
+        for handle in handles:
             if not handle.visible:
                 continue
             if isinstance(handle, viser.GuiHtmlHandle):
@@ -58,8 +59,8 @@ def test_every_verdict_is_declared_with_its_meaning_and_found(
     verdicts = {words: (each, why) for each in features for words, why in each.verdicts.items()}
     assert {"Strokes too short", "Not buildable", "Singular", "Converged"} <= {*verdicts}
     for words, (feature, meaning) in verdicts.items():
-        # A command may have the same words.
-        found = {(each.label, each.value): each.does for each in find(words, entries)[:2]}
+        # Commands and controls may have the same words.
+        found = {(each.label, each.value): each.does for each in find(words, entries)[:4]}
         assert found[words, feature.tabs[0].title] == meaning
         # A sentence without a formula.
         assert meaning.endswith(".")

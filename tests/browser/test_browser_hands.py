@@ -135,7 +135,7 @@ def test_command_is_run_by_the_palette_and_by_its_key_but_not_while_one_types(ta
     # A text is found in its tab, which the arrows and Enter open.
     press(tab, "ControlOrMeta+k")
     search.fill("strokes too short")
-    tab.page.get_by_text("in Prototype", exact=True).wait_for()
+    tab.page.get_by_text("in Prototype", exact=True).first.wait_for()
     press(tab, "ArrowUp")
     press(tab, "ArrowDown")
     press(tab, "Enter")

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 from tab import Tab
 
-from explorer.app.state.actions import Set
+from explorer.app.features.designs.feature import SavedDesigns
+from explorer.app.state.actions import Set, SetName
 from explorer.mechanism.pose import Pose
 
 CTRL, SHIFT = 2, 8
@@ -81,3 +82,26 @@ def test_azerty_has_views_by_its_row_of_digits_and_no_letter_by_a_comma(tab: Tab
     tab.wait_for(lambda: tab.state.view.ghosts, "the other modes")
     tab.settle()
     assert tab.state.view.ghosts
+
+
+def test_ctrl_s_saves_and_ctrl_z_undoes_wherever_the_focus_is(data_tab: Tab) -> None:
+    tab = data_tab
+    session, saved = tab.running.page.session, tab.running.page.services.get(SavedDesigns)
+    session.do(SetName("mine"))
+    tab.settle()
+    eye = tab.client.camera.position
+    home = tab.state.pose
+    for place in ("body", "input", "[role=slider]", "[role=tab]"):
+        tab.page.locator(place).first.evaluate("e => e.focus()")
+        tab.page.keyboard.press("ControlOrMeta+s")
+        tab.wait_for(lambda: saved.find("mine") == tab.state.design, f"saved from {place}")
+        session.do(Set("pose", Pose((10.0, 5.0, 11.0), home.quaternion)))
+        tab.settle()
+        tab.page.locator(place).first.evaluate("e => e.focus()")
+        tab.page.keyboard.press("ControlOrMeta+z")
+        tab.wait_for(lambda: tab.state.pose == home, f"undone from {place}")
+        saved.delete("mine")
+        tab.settle()
+    tab.page.keyboard.press("ControlOrMeta+z")
+    tab.wait_for(lambda: saved.find("mine") is not None, "brought back")
+    assert (tab.client.camera.position == eye).all(), "S moves the camera"

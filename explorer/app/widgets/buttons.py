@@ -88,7 +88,7 @@ class Buttons:
         *,
         keys: tuple[Key, ...] = (),
     ) -> None:
-        """Offer a press on the button with a name and a value in the palette.
+        """Offer a press on the button with a name and a value in the search.
 
         The label names the command, from the tab to the option, and the hint is a sentence
         on it. It can be run while `is_ready` says so.
@@ -144,7 +144,7 @@ def press_button(
         class_name: The classes of the stylesheet.
         hover: The name under which a function is registered that receives the value while the
             pointer rests on the button, and "" once it has left; none if "".
-        opens: Title of the tab or dialog that it opens; "commands" opens the palette.
+        opens: Title of the tab or dialog that it opens.
         is_on: Whether a switch is on; None if the button is no switch.
         is_disabled: Whether the button cannot be pressed.
     """

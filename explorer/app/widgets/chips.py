@@ -21,10 +21,10 @@ from explorer.page.widgets.palette import STEP, Command, Key, with_keys
 
 @dataclass(frozen=True)
 class StateCommand:
-    """A command of the palette that changes the state, and what a button that does it shows.
+    """A command that changes the state, and what a button that does it shows.
 
     Attributes:
-        label: Name in the palette, from the tab to the option.
+        label: Name in the search, from the tab to the option.
         does: Sentence on what it does.
         change: Function from the state to the action; None for none.
         is_on: Function that tells whether a switch or an option is on; None if it is neither.

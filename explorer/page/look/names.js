@@ -6,6 +6,7 @@ window.explorer.names ??= (() => {
     "[role=slider], input:not([type=hidden]):not([type=file]):not([type=checkbox]), textarea";
   // Names of buttons by their icon.
   const ICONS = {
+    "list-search": "Commands",
     adjustments: "Settings of the page",
     "arrow-back": "Back to the controls",
     maximize: "Expand plot",

@@ -1,48 +1,69 @@
 // The search: sends what is typed into it, shows what the server finds, and goes from one to another
-// by the arrows. Enter presses the present one.
+// by the arrows. Enter presses the present one, or the first one once it is there.
 window.explorer.search ??= (() => {
   const { capture } = window.explorer;
-  const FIELD = "input.ex-search",
-    HERE = "is-here";
+  const HERE = "is-here";
+  const fieldOf = () => document.querySelector("input.ex-search");
   const buttons = () => [...document.querySelectorAll(".ex-results > button")];
+  const here = () => document.querySelector(`.ex-results > .${HERE}`);
+  let isAsked = false,
+    isEntered = false;
+  const ask = (field) => {
+    isAsked = true;
+    isEntered = false;
+    window.explorer.press("search.ask", field.value);
+  };
   const show = (button) => {
-    for (const each of buttons()) each.classList.toggle(HERE, each === button);
+    here()?.classList.remove(HERE);
+    button?.classList.add(HERE);
     button?.scrollIntoView({ block: "nearest" });
   };
-  const ask = ({ value }) => window.explorer.press("search.ask", value);
-  const STEPS = { ArrowDown: 1, ArrowUp: -1, Enter: 0 };
+  const step = (by) => {
+    const all = buttons();
+    show(all[(all.indexOf(here()) + by + all.length) % all.length]);
+  };
+  const enter = () => {
+    isEntered = isAsked;
+    if (!isAsked) here()?.click();
+  };
+  const open = () => {
+    window.explorer.open("Search");
+    const field = fieldOf();
+    field?.focus();
+    field?.select();
+    if (field) ask(field);
+  };
+  const KEYS = { ArrowDown: () => step(1), ArrowUp: () => step(-1), Enter: enter };
+  const clear = () => document.querySelector(".ex-results")?.replaceChildren();
   capture("keydown", (event) => {
     const { key, target, ctrlKey, metaKey, shiftKey } = event;
     const letter = (ctrlKey || metaKey) && key.toLowerCase();
-    if (letter === "k" || (letter === "p" && shiftKey)) {
-      window.explorer.open("Search");
-      const field = document.querySelector(FIELD);
-      field?.select();
-      if (field) ask(field);
-    } else if (target.matches?.(FIELD) && key in STEPS) {
-      const all = buttons(),
-        at = all.findIndex((each) => each.classList.contains(HERE));
-      if (STEPS[key]) show(all[(at + STEPS[key] + all.length) % all.length]);
-      else all[at]?.click();
-    } else {
-      if (key === "Escape") clear();
-      return;
-    }
-    event.preventDefault();
-    event.stopPropagation();
+    const isKey = letter === "k" || (letter === "p" && shiftKey);
+    const run = isKey ? open : target === fieldOf() && KEYS[key];
+    if (run) {
+      run();
+      event.preventDefault();
+      event.stopPropagation();
+    } else if (key === "Escape") clear();
   });
-  // What was found is gone once it is pressed or left.
-  const clear = () => document.querySelector(".ex-results")?.replaceChildren();
-  addEventListener("click", ({ target }) => {
-    if (target.closest?.(".ex-results, .ex-shade")) clear();
+  // On a phone viser has a button of its own for its commands.
+  capture("click", (event) => {
+    const { target } = event;
+    // What was found is gone once it is pressed or left.
+    if (target.closest?.(".ex-results > button, .ex-shade")) window.explorer.clock.after(0, clear);
+    if (!target.closest?.("button:has(> * > .tabler-icon-list-search)")) return;
+    event.stopPropagation();
+    open();
   });
   addEventListener("input", ({ target }) => {
-    if (target.matches(FIELD)) ask(target);
+    if (target === fieldOf()) ask(target);
   });
   // What the server has found for a text; another one may have been typed since.
   return (text, html) => {
-    if (document.querySelector(FIELD)?.value !== text) return;
+    if (fieldOf()?.value !== text) return;
+    isAsked = false;
     document.querySelector(".ex-results").innerHTML = html;
     show(buttons()[0]);
+    if (isEntered) enter();
   };
 })();

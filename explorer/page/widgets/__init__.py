@@ -1,1 +1,1 @@
-"""How controls get their values, and the palette of commands."""
+"""How controls get their values, the commands and the search."""

@@ -29,7 +29,7 @@ CAMERA = {"Turn": "drag, arrows", "Move": "right drag", "Zoom": "wheel", "Fly": 
 
 
 class HelpButtons:
-    """The palette, the theme and the help, as buttons of the bar."""
+    """The search, the theme and the help, as buttons of the bar."""
 
     def __init__(self, services: Services) -> None:
         presses: dict[str, Callable[[viser.ClientHandle], None]] = {

@@ -1,6 +1,6 @@
 """The buttons of the optimiser by name: what they do, and when they can be pressed.
 
-They stand in the markup of its tab, in the palette, and wherever else the page shows them.
+They stand in the markup of its tab, in the search, and wherever else the page shows them.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ BUTTONS: Mapping[str, StateCommand] = {
 
 
 def add_buttons(services: Services) -> None:
-    """Register the buttons of the optimiser, and offer them in the palette."""
+    """Register the buttons of the optimiser, and offer them in the search."""
 
     def press(name: str, value: str, client: viser.ClientHandle) -> None:
         is_named = name == LIFT and value
