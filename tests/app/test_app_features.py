@@ -398,6 +398,17 @@ def test_manual_entries_have_names_of_their_own_and_each_tab_has_one() -> None:
         assert marked[tab.title] or tab.place == "dialog", tab.title
 
 
+def test_question_mark_of_a_tab_opens_a_sentence_before_any_formula() -> None:
+    for feature in (each for each in FEATURES if each.manual):
+        file, _, heading = feature.manual.partition("#")
+        text = read_page(file)
+        section = text[text.index(f"# {heading}\n") :] if heading else text
+        # Below the heading, and pictures.
+        paragraphs = [each for each in section.split("\n\n")[1:] if not each.startswith("![")]
+        assert re.match(r"[*`A-Z]", paragraphs[0]), feature.manual
+        assert not re.search(r"^```|=|^\|", paragraphs[0], re.MULTILINE), feature.manual
+
+
 def test_manual_lists_every_key_and_no_other(palette: Palette) -> None:
     section = read_page("page.md").partition("## Keys")[2].partition("\n## ")[0]
     _, *rows = re.findall(r"^\|.*\| (.+) \|$", section, flags=re.MULTILINE)

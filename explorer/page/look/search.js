@@ -26,12 +26,17 @@ window.explorer.search ??= (() => {
     isEntered = isAsked;
     if (!isAsked) here()?.click();
   };
-  const open = () => {
-    window.explorer.open("Search");
+  const begin = () => {
     const field = fieldOf();
     field?.focus();
     field?.select();
     if (field) ask(field);
+  };
+  const open = () => {
+    window.explorer.open("Search");
+    // On a phone a panel unfolds.
+    if (fieldOf()?.checkVisibility()) begin();
+    else window.explorer.clock.after(300, begin);
   };
   const KEYS = { ArrowDown: () => step(1), ArrowUp: () => step(-1), Enter: enter };
   const clear = () => document.querySelector(".ex-results")?.replaceChildren();
