@@ -129,7 +129,7 @@ def test_search_for_impossible_volume_names_the_largest_found() -> None:
     assert_is_sound(outcome)
     assert outcome.status == "infeasible"
     assert "no design within the bounds was found with a volume of 8,000" in outcome.message
-    told = float(outcome.message.rsplit(" ", 1)[1].replace(",", ""))
+    told = float(outcome.message.rsplit(" ", 2)[1].replace(",", ""))
     # More than the paper's designs have, and than random ones within the bounds.
     largest = max(
         workspace_volume(problem.design_at(values)).volume
