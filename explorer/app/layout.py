@@ -137,7 +137,7 @@ def ask_for_room(client: viser.ClientHandle) -> None:
 TITLE = "Flagged 4-4 explorer"
 SIDES: tuple[Side, ...] = get_args(Side)
 PRODUCT = (
-    f'<div class="ex-product"><b>{TITLE}</b>'
+    f'<div class="ex-product"><h1>{TITLE}</h1>'
     '<small class="ex-dim ex-small">six actuators, four legs</small></div>'
 )
 
@@ -159,4 +159,4 @@ class Bar:
         )
         # With this scripts read lengths that are typed in another unit.
         unit = f'data-unit-mm="{frame.state.design.unit_mm!r}"'
-        yield self._html, "content", f'<div class="ex-bar" {unit}>{PRODUCT}{bar}</div>'
+        yield self._html, "content", f'<header class="ex-bar" {unit}>{PRODUCT}{bar}</header>'

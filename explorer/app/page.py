@@ -6,6 +6,7 @@ import threading
 import time
 import traceback
 from collections import deque
+from typing import Literal
 
 import numpy as np
 import viser
@@ -80,9 +81,14 @@ SCRIPTS = (
 )
 # Title of a notice that a request is refused.
 REFUSAL = "That is not possible"
+# Title of a notice of what no request caused.
+NOTE = "Please note"
 # Seconds for which a notice is shown, and not repeated.
 NOTICE_SECONDS = 6.0
-NOTICE_COLOUR = "orange"
+# Colours of a warning, and of a notice that is none.
+Colour = Literal["orange", "blue"]
+WARNING: Colour = "orange"
+NOTICE: Colour = "blue"
 # Largest number of notices that wait for a browser; the newest are kept.
 MOST_PENDING = 10
 # Seconds that the panels of a frame may take during a drag and while another frame waits, and
@@ -114,7 +120,7 @@ class Page:
         self._server = server
         self._notified: dict[str, float] = {}
         # Notices without a browser, kept for the next one; the lock guards them.
-        self._pending: list[tuple[str, str]] = []
+        self._pending: list[tuple[str, str, Colour]] = []
         self._pending_lock = threading.Lock()
         self._follows_at_release = False
         # When the state that is drawn was new.
@@ -140,7 +146,7 @@ class Page:
         # Looks after the cameras once nothing has been drawn for a while, or at a release.
         self._camera_pause = clock.Pause(FOLLOW_SECONDS, self._follow)
         self.pauses = self._drag_pause, self._quiet_pause, self._camera_pause
-        self.jobs = Jobs(self._tell)
+        self.jobs = Jobs(self._warn)
         gui = server.gui
         gui.set_panel_label(TITLE)
         self.buttons = Buttons(server)
@@ -186,7 +192,7 @@ class Page:
         theme.begin(server)
         self.palette = self._add_palette(layout)
         for message in () if user_data is None else user_data.messages:
-            self._tell(sentence(message))
+            self._warn(sentence(message))
         server.on_client_connect(self._show_pending)
         server.on_client_connect(self.services.cameras.connected)
         server.on_client_disconnect(self.services.cameras.disconnected)
@@ -324,13 +330,17 @@ class Page:
         self._notify(REFUSAL, message, who)
 
     def _tell(self, message: str, who: Who = None) -> None:
-        """Notify a browser, or all for None, of what no request caused."""
-        self._notify("Please note", message, who)
+        """Notify a browser, or all for None, of what no request caused and nobody need mend."""
+        self._notify(NOTE, message, who, NOTICE)
+
+    def _warn(self, message: str, who: Who = None) -> None:
+        """Notify a browser, or all for None, of what no request caused and is amiss."""
+        self._notify(NOTE, message, who)
 
     def _show_saving(self, message: str) -> None:
         # The bar shows whether saving fails, also to browsers that come later.
         if self._server.get_clients():
-            self._tell(message)
+            self._warn(message)
         self.session.redraw()
 
     def _report(self, error: Exception) -> None:
@@ -339,7 +349,7 @@ class Page:
         )
         self._notify("Something went wrong", message, None)
 
-    def _notify(self, title: str, message: str, who: Who) -> None:
+    def _notify(self, title: str, message: str, who: Who, colour: Colour = WARNING) -> None:
         now = clock.now()
         if now - self._notified.get(message, -NOTICE_SECONDS) < NOTICE_SECONDS:
             return
@@ -348,16 +358,17 @@ class Page:
         with self._pending_lock:
             clients = self._server.get_clients()
             if who is None and not clients:
-                self._pending = [*self._pending, (title, message)][-MOST_PENDING:]
+                self._pending.append((title, message, colour))
+                del self._pending[:-MOST_PENDING]
         for client_id, client in clients.items():
             if who is None or client_id == who:
                 client.add_notification(
-                    title, message, auto_close_seconds=NOTICE_SECONDS, color=NOTICE_COLOUR
+                    title, message, auto_close_seconds=NOTICE_SECONDS, color=colour
                 )
 
     def _show_pending(self, client: viser.ClientHandle) -> None:
         """Show a new browser the notices that came while there was none, until it closes them."""
         with self._pending_lock:
             pending, self._pending = self._pending, []
-        for title, message in pending:
-            client.add_notification(title, message, color=NOTICE_COLOUR)
+        for title, message, colour in pending:
+            client.add_notification(title, message, color=colour)

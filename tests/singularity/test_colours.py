@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from explorer.app.features.orientation.maps import COLOURS, FREE, OTHER
 from explorer.app.scene.shapes import COMPARED
 from explorer.mechanism.rgb import OUTLINE, Rgb
 from explorer.numerics.arrays import FloatArray
@@ -75,3 +76,9 @@ def test_margins_are_told_from_danger_and_from_compared_designs(vision: FloatArr
     for colour in MARGIN_COLOURS:
         assert min(difference(colour, other, vision) for other in danger) > 0.05
         assert min(difference(colour, other, vision) for other in (*COMPARED, OUTLINE)) > 0.04
+
+
+@pytest.mark.parametrize("vision", VISIONS)
+def test_limits_that_end_tilts_are_told_apart_in_every_common_vision(vision: FloatArray) -> None:
+    for a, b in itertools.combinations((*COLOURS.values(), OTHER, FREE), 2):
+        assert difference(a, b, vision) > 0.07

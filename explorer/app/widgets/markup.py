@@ -78,6 +78,12 @@ def ticks(*places: tuple[float, str]) -> str:
     return f'<div class="ex-ticks ex-dim ex-small">{texts}</div>'
 
 
+def group(name: str, members: Sequence[str]) -> str:
+    """Return a mark that makes a group, for screen readers, of as many controls after it."""
+    label = escape(f"{name}: {', '.join(members)}")
+    return f'<div role="group" aria-label="{label}" data-owns="{len(members)}"></div>'
+
+
 def beside(count: Literal[2, 3], *, wide: bool = False) -> str:
     """Return a mark in a tab: so many controls after it stand side by side if there is room.
 

@@ -16,15 +16,7 @@ window.explorer.fields ??= (() => {
     /^(design )?units?$/.test(unit)
       ? Number(document.querySelector("[data-unit-mm]")?.dataset.unitMm)
       : LENGTHS[unit];
-  // The unit of a field: that in brackets beside it, or else the first one in the title of its
-  // folder; "" for a plain number.
-  const unitOf = (field) => {
-    const words = [window.explorer.names.labelOf(field)];
-    const folder = field.closest(".mantine-Paper-root:has(> .mantine-Paper-root:first-child)");
-    words.push(folder?.firstElementChild.textContent ?? "");
-    const units = words.map((each) => /\((?:± )?([^(),]+)[^()]*\)$/.exec(each.trim())?.[1] ?? "");
-    return (units[0] || units[1]).normalize("NFKC");
-  };
+  const unitOf = (field) => window.explorer.names.unitOf(field);
   const numberIn = (text, unit) => {
     // Full-width characters, as from an input method of East Asia, count too.
     const plain = text

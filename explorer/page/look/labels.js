@@ -298,7 +298,7 @@ window.explorer.labels ??= (() => {
   };
 
   const canvas = document.createElement("canvas");
-  canvas.className = "ex-labels";
+  Object.assign(canvas, { className: "ex-labels", ariaHidden: "true" });
   canvas.style.cssText = "position:absolute;inset:0;pointer-events:none;color:var(--ex-ring)";
   // A picture of the scene alone hides what is not its canvas.
   canvas.style.setProperty("visibility", "visible", "important");

@@ -1,5 +1,6 @@
-// Gives each control the words beside it as its name for screen readers, the browser's tab the names
-// of design and product, and puts hints beside the panel, where they cover no control.
+// Says to screen readers what the page shows by its layout: the words beside a control as its name,
+// its value with the unit, groups of controls, and the parts of the page. Gives the browser's tab the
+// names of design and product, and puts hints beside the panel, where they cover no control.
 window.explorer.names ??= (() => {
   const { capture } = window.explorer;
   const CONTROLS =
@@ -29,12 +30,52 @@ window.explorer.names ??= (() => {
     const labels = rowOf(control)?.querySelectorAll("label[for]") ?? [];
     return labels.length === 1 ? wordsOf(labels[0]) : "";
   };
+  // The unit of a control: that in brackets beside it, or else the first one in the title of its
+  // folder; "" for a plain number.
+  const FOLDER = ".mantine-Paper-root:has(> .mantine-Paper-root:first-child)";
+  const unitOf = (control) => {
+    const title = control.closest(FOLDER)?.firstElementChild.textContent ?? "";
+    const [own, ofAll] = [labelOf(control), title].map(
+      (words) => /\((?:± )?([^(),]+)[^()]*\)$/.exec(words.trim())?.[1] ?? "",
+    );
+    return (own || ofAll).normalize("NFKC");
+  };
+  const tellValue = (slider) => {
+    const words = `${slider.ariaValueNow} ${unitOf(slider).replace("°", "degrees")}`.trim();
+    if (slider.ariaValueText !== words) slider.ariaValueText = words;
+  };
+  // So many rows after the markup of a group belong to it.
+  const nameGroup = (group) => {
+    let row = group;
+    while (!row.nextElementSibling) row = row.parentElement;
+    const ids = Array.from({ length: group.dataset.owns }, (_, index) => {
+      row = row.nextElementSibling;
+      return (row.id ||= `${group.ariaLabel} ${index}`.replace(/\W+/g, "-"));
+    });
+    group.setAttribute("aria-owns", ids.join(" "));
+  };
+  // Parts of the page by their selectors; without a name of its own a part has those of its tabs.
+  const PARTS_OF_PAGE = [
+    ["[data-dock-root] > :first-child", "main", "Scene"],
+    ["[data-dock-region], [data-ex=drawer], [data-ex=card]", "region"],
+    [
+      "canvas[data-engine]",
+      "img",
+      "The mechanism. Arrow keys turn it, W, A, S, D, Q and E move it.",
+    ],
+  ];
+  const namePart = (part, role, words) => {
+    const tabs = [...part.querySelectorAll("[role=tab]")].map((tab) => tab.title);
+    if (part.role !== role) part.role = role;
+    name(part, words ?? tabs.join(", "));
+  };
   const nameControl = (control) => {
     const words = labelOf(control);
     if (!words) return;
     const row = rowOf(control);
     const fields = [...row.querySelectorAll("input[inputmode=decimal]")];
     const part = PARTS[fields.length]?.[fields.indexOf(control)];
+    if (control.role === "slider") tellValue(control);
     name(control, part ? `${words.replace(/ ends$/, "")} ${part}` : words);
   };
   const nameButton = (button) => {
@@ -44,7 +85,7 @@ window.explorer.names ??= (() => {
     }
   };
   const nameTab = () => {
-    const names = ["[data-document]", ".ex-product > b"].map((each) =>
+    const names = ["[data-document]", ".ex-product > h1"].map((each) =>
       document.querySelector(each),
     );
     if (names[0]) document.title = names.map((each) => each.textContent).join(" – ");
@@ -56,6 +97,14 @@ window.explorer.names ??= (() => {
     window.explorer.stops?.();
     document.querySelectorAll(CONTROLS).forEach(nameControl);
     document.querySelectorAll("button").forEach(nameButton);
+    document.querySelectorAll("[data-owns]").forEach(nameGroup);
+    for (const [selector, ...words] of PARTS_OF_PAGE) {
+      document.querySelectorAll(selector).forEach((part) => namePart(part, ...words));
+    }
+    // A list of tabs has tabs alone; each of them opens the panel as this button does.
+    for (const button of document.querySelectorAll("[data-dock-bar] [data-dock-minimize]")) {
+      Object.assign(button, { ariaHidden: "true", tabIndex: -1 });
+    }
   };
   // Width of the widest panel at a side of the window, and room beside a hint, in pixels.
   const WIDEST = 420,
@@ -82,6 +131,10 @@ window.explorer.names ??= (() => {
   };
   const changes = { childList: true, characterData: true, subtree: true };
   new MutationObserver(nameSoon).observe(document.body, changes);
+  new MutationObserver((values) => values.forEach(({ target }) => tellValue(target))).observe(
+    document.body,
+    { subtree: true, attributeFilter: ["aria-valuenow"] },
+  );
   nameAll();
   // What has the focus, or else the pointer, is named on the root: the stylesheet may point at it.
   let pointed = null;
@@ -95,5 +148,5 @@ window.explorer.names ??= (() => {
   };
   capture("pointerover", pointAt);
   for (const event of ["focusin", "focusout"]) capture(event, mark);
-  return { labelOf, rowOf };
+  return { rowOf, unitOf };
 })();

@@ -42,6 +42,7 @@ window.explorer.stops ??= (() => {
     head.tabIndex = 0;
     head.setAttribute("role", "button");
     head.ariaExpanded = isOpen(head);
+    Object.assign(head.parentElement, { role: "group", ariaLabel: head.textContent });
     if (known.has(head)) return;
     known.add(head);
     if ((folders[nameOf(head)] ?? isOpen(head)) !== isOpen(head)) head.click();

@@ -7,7 +7,7 @@ window.explorer.tour ??= (() => {
     CLOSE = `${DRAWER} [data-dock-minimize]`;
   const FRONT = "[data-dock-strip] > [aria-selected=true]:not([data-ex=dialog] *)";
   const card = document.createElement("div");
-  card.className = "ex-tour";
+  Object.assign(card, { className: "ex-tour", role: "region", ariaLabel: "Tour" });
   // What was in front before the tour; null without a tour.
   let before = null;
   // The step whose tab is in front, and the wanted one.

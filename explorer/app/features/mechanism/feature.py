@@ -28,7 +28,7 @@ from explorer.app.state.state import Hold, State
 from explorer.app.state.view import LengthName
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chips, StateCommand, choose
-from explorer.app.widgets.markup import alert, box, note, remark
+from explorer.app.widgets.markup import alert, box, group, note, remark
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.page.look import read_file
@@ -86,6 +86,7 @@ class MovePanel:
         self._switch = gui.add_html("")
         self._sliders = gui.add_folder("")
         with self._sliders:
+            position = gui.add_html(group("position", "xyz"))
             for axis, name in enumerate("xyz"):
                 controls.slider(
                     name,
@@ -95,6 +96,8 @@ class MovePanel:
                     power=1,
                     visible=_is_by_position,
                 )
+            angles = gui.add_html(group("angles", [name for name, _, _ in ANGLES]))
+            self._groups = position, angles
             for axis, (name, order, edge) in enumerate(ANGLES):
                 controls.slider(
                     f"{name} (°)",
@@ -143,6 +146,8 @@ class MovePanel:
         switch = f'<div class="ex-segments" role="toolbar" aria-label="Set by">{buttons}</div>'
         yield self._switch, "content", switch + points * _is_by_position(state)
         yield self._sliders, "label", f"{sliders} ({units})"
+        for group_mark in self._groups:
+            yield group_mark, "visible", _is_by_position(state)
         # What is wrong with a length is told whatever the sliders are.
         is_told = _is_by_lengths(state) or unclosed is not None or state.remark is not None
         yield from show_html(self._message, message(state) if is_told else "")

@@ -30,24 +30,27 @@ LEAST_EDGE = 60.0
 # Difference of torsions in degrees up to which the torsion of home is that of the map.
 SAME_TORSION = 0.05
 
-FREE: Rgb = (140, 150, 160)
+FREE: Rgb = (132, 156, 199)
 """Colour where the platform tilts by 180° without a limit."""
 
 COLOURS: dict[str, Rgb] = {
     **{f"margin δ{index}": colour for index, colour in enumerate(MARGIN_COLOURS, 1)},
-    "carriage order": (0, 150, 150),
-    "gap": (120, 200, 200),
-    "l1": (24, 74, 150),
-    "d2": (60, 150, 230),
-    "d4": (140, 190, 240),
-    "l4": (70, 80, 200),
-    "d1": (150, 120, 50),
-    "d3": (205, 170, 80),
+    "carriage order": (10, 153, 149),
+    "gap": (61, 203, 114),
+    "l1": (40, 56, 119),
+    "d2": (79, 98, 191),
+    "d4": (151, 179, 235),
+    "l4": (71, 64, 173),
+    "d1": (162, 109, 0),
+    "d3": (216, 167, 35),
     "box": (90, 98, 110),
 }
-"""Colours of limits by the beginning of their names; those of margins are theirs in the scene."""
+"""Colours of limits by the beginning of their names; those of margins are theirs in the scene.
 
-OTHER: Rgb = (120, 70, 40)
+Any two differ for colour-blind eyes too, since any limit may end the tilts beside any other.
+"""
+
+OTHER: Rgb = (121, 70, 38)
 """Colour of other limits, such as those of swings."""
 
 # Difference of tilts in degrees below which they count as one.
