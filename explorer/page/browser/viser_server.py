@@ -128,9 +128,6 @@ def stop_viser(server: viser.ViserServer) -> None:
     """Stop a server, without the line that its thread prints to standard output."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
-        # Gap: `stop` returns before the thread has ended.
-        internals: Any = server
-        internals._websock_server._server_thread.join(timeout=5.0)
 
 
 def protect(server: viser.ViserServer) -> None:
