@@ -306,7 +306,9 @@ window.explorer.labels ??= (() => {
     shownHeight = 1;
   const pageView = () => {
     const { canvas: scene, camera } = page();
-    return { camera, width: scene.clientWidth, height: scene.clientHeight };
+    // The size that the scene is drawn for; paper may show it in another one.
+    const [width, height] = [scene.style.width, scene.style.height].map(parseFloat);
+    return { camera, width, height };
   };
   const repaint = () => {
     const { canvas: scene } = page();
@@ -314,7 +316,7 @@ window.explorer.labels ??= (() => {
     const { width, height } = pageView();
     shownHeight = height;
     const ratio = devicePixelRatio;
-    const sides = [Math.round(ratio * width), Math.round(ratio * height)];
+    const sides = [Math.floor(ratio * width), Math.floor(ratio * height)];
     // A canvas that takes a size is cleared and loses its pen's properties.
     if (canvas.width !== sides[0] || canvas.height !== sides[1]) {
       [canvas.width, canvas.height] = sides;
