@@ -227,13 +227,13 @@ class Monkey:
     def _keep_fault(self, error: Exception) -> None:
         self.report.faults.append(repr(error))
 
-    def _listen(self, notify: Callable[[str, str, int | None], None]) -> Callable[..., None]:
+    def _listen(self, notify: Callable[..., None]) -> Callable[..., None]:
         """Return how to notify people, so that what is no fault of theirs is kept."""
 
-        def notify_and_keep(title: str, message: str, who: int | None) -> None:
+        def notify_and_keep(title: str, message: str, *others: object) -> None:
             if title != REFUSAL and not EXPECTED.fullmatch(message):
                 self.report.faults.append(message)
-            notify(title, message, who)
+            notify(title, message, *others)
 
         return notify_and_keep
 
