@@ -32,6 +32,7 @@ from explorer.mechanism.configuration import Configuration, Point, offset_of
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
 from explorer.mechanism.margins import mode_of
 from explorer.mechanism.pose import (
+    Pose,
     quaternion_from_rotation,
     rotation_from_quaternion,
     rotation_from_yaw_pitch_roll,
@@ -66,7 +67,7 @@ _UNITS: dict[str, Mapping[str, float]] = {
     **dict.fromkeys((*JOINTS, *POSITION, *TOOL, *TARGETS, *DISTANCES, SIGMA), _LENGTH),
     **dict.fromkeys((*YAW_PITCH_ROLL, *TILT_TORSION), _ANGLE),
     **{name: {} for name in (*QUATERNION, PLANE)},
-    "time": {"s": 1.0},
+    **{name: {"s": 1.0} for name in ("time", "pause")},
 }
 _HEADING = re.compile(
     r"(\w+?)\s*(?:[\[(]\s*([-+.\de]*)\s*([a-z°]+)\s*[\])]"
@@ -265,6 +266,28 @@ def read_poses(
         rotation = _ROTATIONS[names](values)
     position = table.numbers(*(POSITION if at == "b4" else TOOL))
     return Configuration(design, position - offset_of(design, rotation, at), rotation)
+
+
+def read_corners(
+    table: PoseTable, design: Design, rotation: FloatArray, at: Point = "b4"
+) -> tuple[tuple[Pose, ...], tuple[float, ...]]:
+    """Return the corners of a path in a table, and its pauses there in seconds, zero if none.
+
+    Raises:
+        InputError: As in `read_poses`; the table is a path in time, or a pause is below zero.
+    """
+    if "time" in table.columns:
+        raise InputError(
+            f"{table.file} has a column time, so it is a path in time already: give the "
+            "corners alone, such as those of explorer path --corners"
+        )
+    c = read_poses(table, design, rotation, at)
+    poses = tuple(Pose.of(*each) for each in zip(c.positions, c.rotations, strict=True))
+    has_pauses = "pause" in table.columns
+    pauses = table.numbers("pause", blank=0.0)[:, 0] if has_pauses else np.zeros(len(poses))
+    for index in np.flatnonzero(pauses < 0.0).tolist():
+        table.refuse(index, "pause", "a pause must not be below zero")
+    return poses, tuple(pauses.tolist())
 
 
 def read_joints(table: PoseTable) -> FloatArray:

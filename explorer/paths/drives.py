@@ -44,12 +44,13 @@ class TimedPath(NamedTuple):
 
     Attributes:
         poses: Corners of the path, two or more.
-        duration: Duration in seconds, in which the fastest actuator accelerates over one half of
-            each move and brakes over the other, always by the same; None for the shortest time
-            within the limits of the actuators, which needs the extra `timing`.
+        duration: Duration in seconds with all pauses, in which the fastest actuator accelerates
+            over one half of each move and brakes over the other, always by the same; None for the
+            shortest time within the limits of the actuators, which needs the extra `timing`.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
         density: Density of legs and platform in kg/m³, as bars with the legs' radii.
-        law: Time law of the path, in place of a duration.
+        law: Time law of the path, in place of a duration and pauses.
+        pauses: Pauses at the corners in seconds, one for each; none if empty.
     """
 
     poses: Sequence[Pose]
@@ -57,6 +58,7 @@ class TimedPath(NamedTuple):
     tool: Triple | None = None
     density: float = DENSITY
     law: TimeLaw | None = None
+    pauses: Sequence[float] = ()
 
 
 class Binding(NamedTuple):
@@ -216,13 +218,11 @@ def drives_along(design: Design, path: TimedPath) -> PathDrives:
     """Return speeds, forces and powers of the actuators along a path within a design's limits.
 
     Raises:
-        InputError: The path leaves the limits or has no length, the platform has no mass, or
-            nothing limits the time.
+        InputError: The path leaves the limits, or as in `law_of_path`.
         MissingExtraError: toppra is not installed.
-        NoAnswerError: The path is singular, or a weight exceeds the largest force at rest.
+        NoAnswerError: As in `law_of_path`.
     """
-    moves, law = StraightMoves.along(path.poses, path.tool), path.law
-    check_limits(design, moves)
+    check_limits(design, StraightMoves.along(path.poses, path.tool))
     # With a limit of the margins no path within the limits is singular.
     if design.limits.margin is None:
         from explorer.paths.crossings import path_margins
@@ -231,11 +231,27 @@ def drives_along(design: Design, path: TimedPath) -> PathDrives:
         if singular.crossings or singular.lies_in:
             raise NoAnswerError(SINGULAR)
     bodies = moving_bodies(design, bar_masses(design, path.density))
-    if law is None and path.duration is not None:
-        law = law_at_speed(design, moves, acceleration=1.0).lasting(path.duration)
-    elif law is None:
-        law = law_of_shortest_time(design, moves, bodies)
-    return PathDrives.along(design, law, bodies)
+    return PathDrives.along(design, law_of_path(design, path), bodies)
+
+
+def law_of_path(design: Design, path: TimedPath) -> TimeLaw:
+    """Return the one time law of a path: that of its duration, or of the shortest time.
+
+    Raises:
+        InputError: The path has no length, the platform has no mass, nothing limits the time, or
+            the pauses take all of it.
+        MissingExtraError: toppra is not installed.
+        NoAnswerError: The path is singular, or a weight exceeds the largest force at rest.
+    """
+    if path.law is not None:
+        return path.law
+    moves, pauses = StraightMoves.along(path.poses, path.tool), path.pauses
+    pauses = pauses or [0.0] * len(path.poses)
+    if path.duration is not None:
+        law = law_at_speed(design, moves, acceleration=1.0)
+        return law.with_pauses(pauses).lasting(path.duration)
+    bodies = moving_bodies(design, bar_masses(design, path.density))
+    return law_of_shortest_time(design, moves, bodies).with_pauses(pauses)
 
 
 def check_limits(design: Design, moves: StraightMoves) -> None:

@@ -4,14 +4,15 @@ A law keeps the geometry of its path, so that it stops at every corner, which on
 accelerations would pass. So it is the sequence of its moves, whose times add up. A move consists of
 intervals, in each of which one leader has a constant acceleration: an actuator, or the platform,
 whose travel is in proportion to the share of the move. In the law at a speed the fastest actuator
-leads everywhere, and the speed of the leader over time is a trapezoid in closed form.
+leads everywhere, and the speed of the leader over time is a trapezoid in closed form. A pause at a
+corner is an interval without a way.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -188,17 +189,25 @@ class TimeLaw:
             no time.
         speed: Speeds of the leader at both ends, in design units per second, shape (n, 2).
         acceleration: Acceleration of the leader, below zero while it brakes, shape (n,).
+        pause: Times in seconds of intervals without a way, zero of the others, shape (n,); those of
+            a law without pauses if there are none.
     """
 
     travel: Travel
     intervals: LedIntervals
     speed: FloatArray
     acceleration: FloatArray
+    pause: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def steps(self) -> FloatArray:
         """Times that the intervals take in seconds, shape (n,)."""
-        return 2.0 * self.travel.ways(self.intervals) / self.speed.sum(axis=1)
+        if not len(self.pause):
+            return 2.0 * self.travel.ways(self.intervals) / self.speed.sum(axis=1)
+        steps, moves = self.pause.copy(), self.pause == 0.0
+        led = self.intervals.select(moves)
+        steps[moves] = 2.0 * self.travel.ways(led) / self.speed[moves].sum(axis=1)
+        return steps
 
     @cached_property
     def time(self) -> FloatArray:
@@ -211,15 +220,51 @@ class TimeLaw:
         return float(self.time[-1])
 
     def lasting(self, duration: float) -> TimeLaw:
-        """Return this law with another duration in seconds.
+        """Return this law with another duration in seconds; pauses stay as long as they are.
 
         Raises:
-            InputError: The duration is not above zero.
+            InputError: The duration is not above zero, or pauses take all of it.
         """
         if not 0.0 < duration < math.inf:
             raise InputError(f"the duration must be above zero; got {duration:g} s")
-        times = duration / self.duration
+        pauses = float(self.pause.sum())
+        if not pauses < duration:
+            raise InputError(
+                f"the pauses take {pauses:g} s of the {duration:g} s: choose a longer duration or "
+                "shorter pauses"
+            )
+        times = (duration - pauses) / (self.duration - pauses)
         return replace(self, speed=self.speed / times, acceleration=self.acceleration / times**2)
+
+    def with_pauses(self, pauses: Sequence[float]) -> TimeLaw:
+        """Return this law, which has none, with a pause in seconds at each corner of the path.
+
+        Raises:
+            InputError: There are not as many as corners, or one is below zero.
+        """
+        count, given = len(self.travel.moves.step) + 1, np.array(pauses, dtype=np.float64)
+        if given.shape != (count,) or not ((given >= 0.0) & np.isfinite(given)).all():
+            raise InputError(f"a path of {count} poses needs as many pauses, none below 0 s")
+        corners = np.flatnonzero(given)
+        if not len(corners):
+            return self
+        # The pause at a corner stands before the first interval of what follows it.
+        led, index = self.intervals, np.searchsorted(self.intervals.number, corners)
+        is_last = index == len(led.number)
+        number = led.number[index - is_last]
+        share = np.repeat(np.where(is_last, 1.0, 0.0)[:, None], 2, axis=1)
+        intervals = LedIntervals(
+            np.insert(led.number, index, number),
+            np.insert(led.leader, index, PLATFORM),
+            np.insert(led.share, index, share, axis=0),
+        )
+        return replace(
+            self,
+            intervals=intervals,
+            speed=np.insert(self.speed, index, 0.0, axis=0),
+            acceleration=np.insert(self.acceleration, index, 0.0),
+            pause=np.insert(np.zeros(len(led.number)), index, given[corners]),
+        )
 
     def at(self, time: FloatArray) -> Motion:
         """Return the motion at times (n,); at a corner, that with which the next move starts."""
@@ -240,7 +285,9 @@ class TimeLaw:
         time = self.time[index] + part * self.steps[index]
         led, (start, end) = self.intervals.select(index), self.speed[index].T
         speed = start + part * (end - start)
-        share = self.travel.shares_after(led, part * (start + speed) / (start + end))
+        share, moves = led.share[:, 0].copy(), np.flatnonzero(start + end)
+        gone = (part * (start + speed))[moves] / (start + end)[moves]
+        share[moves] = self.travel.shares_after(led.select(moves), gone)
         slopes, curvatures = self.travel.derivatives(led.number, share)
         slope, curvature = (_pick(each, led.leader) for each in (slopes, curvatures))
         rate = speed / np.abs(slope)

@@ -49,6 +49,29 @@ def test_drives_of_a_table_of_corners_and_their_csv_agree(cli: CommandLine, tmp_
     assert "One motor for all six needs at least" in cli.text(*words)
 
 
+def test_pauses_of_a_table_of_corners_are_part_of_the_duration(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    plain, paused = tmp_path / "plain.csv", tmp_path / "paused.csv"
+    plain.write_text(CORNERS, encoding="utf-8")
+    pauses = ("pause_s", "0", "0.1", "", "0.2")
+    lines = map(",".join, zip(CORNERS.split(), pauses, strict=True))
+    paused.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    for words, given in (
+        (("--duration", "0.5"), ("--duration", "0.8")),
+        (("--speed", "30", "--acceleration", "1000"),) * 2,
+    ):
+        moving = cli.answer("--path", plain, "--payload", "2", *words)
+        found = cli.answer("--path", paused, "--payload", "2", *given)
+        assert found["duration"] == pytest.approx(moving["duration"] + 0.3)
+        assert found["peak_force"] == pytest.approx(moving["peak_force"], rel=1e-9)
+    refused = cli.refusal("--path", paused, "--payload", "2", "--duration", "0.3")
+    assert "the pauses take 0.3 s of the 0.3 s" in refused
+    paused.write_text("x,y,z,pause_s\n10,5,9,0\n11,5,9,-1\n", encoding="utf-8")
+    refused = cli.refusal("--path", paused, "--duration", "1")
+    assert "line 3, column pause_s: '-1': a pause must not be below zero" in refused
+
+
 def test_drives_take_the_corners_of_a_planned_path_and_the_shortest_time_of_a_design(
     cli: CommandLine, tmp_path: Path
 ) -> None:

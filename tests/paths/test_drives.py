@@ -114,6 +114,23 @@ def test_slower_law_has_slower_speeds_and_in_the_end_the_forces_at_rest() -> Non
     assert_allclose(less, added / 9.0, atol=1e-6 * np.abs(added).max())
 
 
+def test_pauses_hold_the_forces_at_rest_and_count_in_the_means() -> None:
+    path, duration, pause = random_path(1), 0.5, 0.2
+    pauses = (0.0, pause, *[0.0] * (len(path) - 2))
+    found = drives_along(OPTIMAL, TimedPath(path, duration, pauses=pauses))
+    moving = drives_of(OPTIMAL, law_of_duration(path, duration - pause))
+    assert found.law.duration == pytest.approx(duration, rel=1e-12)
+    assert_allclose(found.summary.peak_force, moving.summary.peak_force, rtol=1e-9)
+    at_rest = drives_of(OPTIMAL, law_of_duration(path, 3e4))
+    resting = found.force[np.repeat(found.law.pause > 0.0, 3)]
+    still = at_rest.at(
+        at_rest.law.time[np.flatnonzero(np.diff(at_rest.law.intervals.number))[:1] + 1]
+    )
+    assert_allclose(resting, np.repeat(still.force, 3, axis=0), rtol=1e-5)
+    squares = (duration - pause) * moving.summary.rms_force**2 + pause * resting[0] ** 2
+    assert_allclose(found.summary.rms_force, np.sqrt(squares / duration), rtol=1e-9)
+
+
 def test_motion_along_the_guide_has_the_numbers_of_its_closed_form() -> None:
     duration, mass = 0.5, 2.0
     bodies = MovingBodies().with_mass(mass, (0.0, 0.0, 0.0))

@@ -312,6 +312,38 @@ def test_laws_rest_at_every_corner_and_lie_on_the_path() -> None:
         assert np.abs(rates[[0, -1]]).max() < 0.01 * np.abs(rates).max()
 
 
+def test_law_with_pauses_is_that_without_them_and_rests_at_its_corners() -> None:
+    design, path = random_case(9)
+    path.insert(1, path[1])
+    pauses = [0.2, 0.0, 0.5, 0.3]
+    for law_of in laws_of(design):
+        law = law_of(path)
+        paused = law.with_pauses(pauses)
+        assert paused.duration == pytest.approx(law.duration + 1.0, rel=1e-12)
+        time = np.linspace(0.0, law.duration, 101)[1:-1]
+        before = law.at(time)
+        # The second move has no length, so that both of its pauses stand before the third one.
+        later = pauses[0] + np.where(before.number == 0, 0.0, pauses[2])
+        moved = paused.at(time + later)
+        assert_allclose(moved.number + moved.share, before.number + before.share, atol=1e-9)
+        assert_allclose(moved.rate, before.rate, rtol=1e-6, atol=1e-9)
+        found = trajectory(design, path, law=paused, samples=4001)
+        assert (found.at[0], found.at[-1]) == (0.0, 3.0)
+        assert (np.diff(found.at) >= 0.0).all()
+        resting = paused.within_intervals([0.5])
+        still = paused.pause > 0.0
+        assert paused.pause[still].tolist() == [0.2, 0.5, 0.3]
+        assert not resting.rate[still].any()
+        assert not resting.change[still].any()
+        assert np.isfinite(resting.change).all()
+    slower = law_at_speed(design, StraightMoves.along(path), acceleration=1.0).with_pauses(pauses)
+    assert slower.lasting(3.0).duration == pytest.approx(3.0, rel=1e-12)
+    assert_allclose(slower.lasting(3.0).steps[slower.pause > 0.0], [0.2, 0.5, 0.3])
+    assert "the pauses take 1 s of the 0.9 s" in refusal(slower.lasting, 0.9)
+    for wrong in ([0.1], [0.0, 0.0, -0.1, 0.0]):
+        assert "as many pauses" in refusal(slower.with_pauses, wrong)
+
+
 def test_moves_below_the_rounding_of_a_table_take_no_time() -> None:
     design, path = random_case(9)
     x, y, z = path[-1].position

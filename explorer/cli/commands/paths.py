@@ -13,7 +13,7 @@ import tyro
 
 from explorer.cli import options, output, values
 from explorer.errors import InputError
-from explorer.export.pose_tables import read_poses, read_table
+from explorer.export.pose_tables import read_corners, read_table
 from explorer.export.tables import corners_csv, drives_csv, trajectory_csv
 from explorer.files.writing import check_writable
 from explorer.legs.moves import StraightMoves
@@ -205,11 +205,11 @@ class DrivesCommand(TimedOptions):
 
     path: Annotated[Path | None, values.hint("instead of --from and --to", "FILE")] = None
     """Corners of the path: a table of poses as that of `explorer inverse --poses`, such as
-    `explorer path --corners` writes."""
+    `explorer path --corners` writes; a column `pause_s` has the pauses there."""
 
     duration: Annotated[values.Positive, values.hint("default: the shortest")] = None
-    """Duration in seconds, in which the fastest actuator accelerates over one half of each move
-    and brakes over the other, always by the same."""
+    """Duration in seconds with all pauses, in which the fastest actuator accelerates over one half
+    of each move and brakes over the other, always by the same."""
 
     payload: Annotated[values.NotNegative, values.OF_DESIGN] = None
     """Mass of the payload, in kg."""
@@ -227,13 +227,15 @@ class DrivesCommand(TimedOptions):
         design = options.with_payload(design, self.payload)
         if self.out is not None:
             check_writable(self.out)
-        poses, tool = self._poses(design), self.tool(design)
-        law = None if self.acceleration is None else self.law(design, poses)
+        (poses, pauses), tool = self._corners(design), self.tool(design)
+        law = None
+        if self.acceleration is not None:
+            law = self.law(design, poses).with_pauses(pauses)
         if self.speed is not None and law is None:
             raise InputError("--speed needs --acceleration: a path starts and ends at rest")
         if self.duration is not None and law is not None:
             raise InputError("give either --duration, or --speed and --acceleration")
-        path = drives.TimedPath(poses, self.duration, tool, self.density, law)
+        path = drives.TimedPath(poses, self.duration, tool, self.density, law, pauses)
         found = drives.drives_along(design, path)
         timed = trajectory(design, poses, law=found.law, samples=self.samples, tool=tool)
         files = {} if self.out is None else {self.out: drives_csv(found, timed).encode()}
@@ -249,20 +251,13 @@ class DrivesCommand(TimedOptions):
         }
         self.write(lambda: answer, lines, errors)
 
-    def _poses(self, design: Design) -> tuple[Pose, ...]:
-        """Return the corners of the path."""
+    def _corners(self, design: Design) -> tuple[tuple[Pose, ...], tuple[float, ...]]:
+        """Return the corners of the path, and its pauses there."""
         start, goal = self.ends(design)
         if self.path is None:
             if goal is None:
                 raise InputError(f"give --path, or say where the path ends {options.END_OPTIONS}")
-            return start, goal
+            return (start, goal), (0.0, 0.0)
         if goal is not None or start != design.home_pose:
             raise InputError("--path has the ends: leave out --from, --to and their orientations")
-        table = read_table(self.path, design.unit_mm)
-        if "time" in table.columns:
-            raise InputError(
-                f"{self.path} has a column time, so it is a path in time already: give the "
-                "corners alone, such as those of explorer path --corners"
-            )
-        c = read_poses(table, design, start.rotation, self.at)
-        return tuple(Pose.of(*each) for each in zip(c.positions, c.rotations, strict=True))
+        return read_corners(read_table(self.path, design.unit_mm), design, start.rotation, self.at)
