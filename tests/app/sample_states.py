@@ -28,6 +28,8 @@ from explorer.app.features.optimise.state import (
     SearchRun,
 )
 from explorer.app.features.paths.actions import Go, Play, SetPathTime
+from explorer.app.features.paths.state import Stop
+from explorer.app.features.paths.stops import add_present
 from explorer.app.features.requirement.state import EXAMPLE, Required
 from explorer.app.features.studies.actions import BrushAxes
 from explorer.app.features.studies.state import Brush, Studies
@@ -179,15 +181,18 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: Go(),
     lambda state, i, share: SetPathTime(8.0 * share),
     lambda state, i, share: Play(on=i > 2),
-    lambda state, i, share: Change("paths", {"start": (None, i, state.pose)[i % 3]}),
-    lambda state, i, share: Change("paths", {"goal": (None, 7 - i, state.pose)[i // 2]}),
+    lambda state, i, share: Change("paths", {"stops": (Stop((None, i, state.pose)[i % 3]),)}),
+    lambda state, i, share: Change(
+        "paths", {"stops": (Stop(), Stop((7 - i, state.pose)[i % 2], share))[: 1 + i % 2]}
+    ),
+    lambda state, i, share: add_present(state),
     lambda state, i, share: Change(
         "paths",
         {
             "kind": "straight" if i > 2 else "planned",
             "seconds": 1e-3 + share,
             "holds_load": share > 0.5,
-            "drives": ("off", "shortest", "duration")[i % 3],
+            "law": ("watchable", "shortest", "duration")[i % 3],
             "duration": 1e-3 + share,
         },
     ),
@@ -261,15 +266,15 @@ def rich_state() -> State:
         SetVariable("b2", 2.7),
         Change("", {"view": varied(View()), "hold": "legs"}),
         SetPosition(0, 11.1),
-        Change("paths", {"start": home, "goal": beyond, "seconds": 1 / 3}),
+        Change("paths", {"stops": (Stop(home, 1 / 3), Stop(beyond)), "seconds": 1 / 3}),
         StartRun(),
         lambda state: _end(state, 6),
         Accept(),
-        Change("paths", {"start": 3, "goal": 5}),
+        Change("paths", {"stops": (Stop(3), Stop(5, 1 / 7))}),
         Go(),
         SetPathTime(10 / 3),
-        Change("paths", {"start": home, "goal": beyond, "kind": "planned", "holds_load": True}),
-        Change("paths", {"drives": "duration", "duration": 0.5}),
+        Change("paths", {"stops": (Stop(home), Stop(beyond)), "kind": "planned", "chosen": 1}),
+        Change("paths", {"law": "duration", "duration": 0.5, "slower": 10.0, "holds_load": True}),
         Pin(OPTIMAL),
         Change("compared", {"look": varied(CompareView())}),
         Set("studies", varied(Studies())),

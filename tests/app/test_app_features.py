@@ -31,7 +31,8 @@ from explorer.app.features.loads.load import WEIGHTS_FEED, SetForce
 from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import AddIterates, Compare, EndRun
 from explorer.app.features.orientation.work import TILTS_FEED, GoToTilt, SetTiltTorsion
-from explorer.app.features.paths.actions import AdvanceJourney, SetEnd, SetPathTime, TakePlan
+from explorer.app.features.paths.actions import AdvanceJourney, SetLaw, SetPathTime, TakePlan
+from explorer.app.features.paths.stops import ChooseStop, SetStop
 from explorer.app.features.requirement.state import OpenFound
 from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
@@ -259,7 +260,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
-    SetFold, SetVariable, SetName, SetPathTime, SetEnd, PickDesign, OpenFound,
+    SetFold, SetVariable, SetName, SetPathTime, SetLaw, SetStop, ChooseStop, PickDesign, OpenFound,
     OpenSession,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map, a handle or a file gives."""

@@ -18,7 +18,7 @@ from explorer.app.features.mechanism.feature import DesignPanel
 from explorer.app.features.optimise.actions import EndRun, Revert, StartRun, TakePaperProblem
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchResult
 from explorer.app.features.optimise.work import PAPER_REQUEST
-from explorer.app.features.paths.state import Paths
+from explorer.app.features.paths.state import Paths, Stop
 from explorer.app.session.history import start_history
 from explorer.app.state.actions import Open, Reset, Set
 from explorer.app.state.frame import Frame
@@ -42,13 +42,13 @@ LENGTHS = (
     *(f"design.payload.centre.{axis}" for axis in range(3)),
     *(f"design.limits.leg_radii.{leg}" for leg in range(4)),
     *("view.warn_below", "view.workspace.level", "view.workspace.tolerance"),
-    *(f"paths.{end}.position.{axis}" for end in ("start", "goal") for axis in range(3)),
+    *(f"paths.stops.{index}.at.position.{axis}" for index in range(2) for axis in range(3)),
     *(f"optimisation.request.{name}" for name in ("reach", "clearance")),
 )
 """The lengths that stay, by their paths."""
 
 IN_OTHER_UNITS = """
-paths: seconds, duration, request
+paths: seconds, duration, slower, request
 optimisation.request: starts
 view.prototype: exploded, density
 view.forces: force, moment, scale
@@ -82,7 +82,11 @@ def asked() -> State:
     )
     start, goal = (Pose((9.0, y, 9.0), OPTIMAL.home_pose.quaternion) for y in (5.0, 6.5))
     request = OptimisationRequest(volume=900.0, reach=19.0, clearance=0.3)
-    state = with_value(open_state(design), "paths", Paths(start, goal, "planned", holds_load=True))
+    state = with_value(
+        open_state(design),
+        "paths",
+        Paths((Stop(start), Stop(goal)), kind="planned", holds_load=True),
+    )
     state = with_value(state, "optimisation.request", request)
     for path, value in (
         ("view.warn_below", 1.7),
@@ -229,7 +233,7 @@ def _is_number(value: Any) -> bool:
 
 
 def test_every_number_of_view_paths_and_request_is_a_declared_length_or_none() -> None:
-    paths = Paths(OPTIMAL.home_pose, OPTIMAL.home_pose)
+    paths = Paths((Stop(OPTIMAL.home_pose), Stop(OPTIMAL.home_pose)))
     request = replace(varied(OptimisationRequest()), free=())
     lines = [line.split(": ") for line in IN_OTHER_UNITS.strip().splitlines()]
     others = {f"{part}.{name}" for part, names in lines for name in names.split(", ")}

@@ -12,7 +12,7 @@ from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -22,25 +22,22 @@ from services import StubDownloads, StubJobs, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.loads.load import weights_of_parts
+from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.paths.actions import (
     AdvanceJourney,
     Go,
     Play,
+    SetLaw,
     SetPathTime,
     TakePlan,
-    ends_of,
-    goal_of,
 )
-from explorer.app.features.paths.drives import drives_html
-from explorer.app.features.paths.feature import DIED, PathRunner, PathScene
+from explorer.app.features.paths.editor import MODES, PRESENT, TYPED, StopHandle, numbers_of
+from explorer.app.features.paths.feature import DIED, PathRunner, PathScene, path_chip
 from explorer.app.features.paths.panel import (
     CANCEL,
-    ENDS,
-    MODES,
-    PRESENT,
-    TYPED,
     PathsPanel,
-    end_numbers,
+    drives_html,
+    path_title,
     plan_words,
 )
 from explorer.app.features.paths.plots import (
@@ -51,7 +48,26 @@ from explorer.app.features.paths.plots import (
     margins_html,
     margins_over,
 )
-from explorer.app.features.paths.state import STRAIGHT_SECONDS, End, Journey, Paths, journey_of
+from explorer.app.features.paths.state import (
+    MOST_STOPS,
+    WATCH_SECONDS,
+    Journey,
+    Paths,
+    Stop,
+    StopAt,
+    journey_of,
+)
+from explorer.app.features.paths.stops import (
+    add_present,
+    close_path,
+    copy_stop,
+    lift_stop,
+    poses_of,
+    remove_stop,
+    set_stop,
+    stops_in_table,
+    stops_of,
+)
 from explorer.app.features.paths.work import DrivesRequest, draw_drives, request_for
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Action, Set
@@ -69,6 +85,7 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS
+from explorer.paths.drives import drives_along
 from explorer.paths.loads import path_loads
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
@@ -111,8 +128,13 @@ def bench() -> Generator[Bench]:
     bench.jobs.stop()
 
 
-def with_ends(state: State, start: End = None, goal: End = None) -> State:
-    return with_value(state, "paths", replace(Paths.of(state), start=start, goal=goal))
+def with_ends(state: State, start: StopAt = None, goal: StopAt = None) -> State:
+    ends = (Stop(start),) if goal is None else (Stop(start), Stop(goal))
+    return with_value(state, "paths", replace(Paths.of(state), stops=ends))
+
+
+def goal_of(state: State) -> StopAt:
+    return stops_of(state)[-1].at
 
 
 def start_between(first: int, last: int, pose: Pose = TILTED) -> State:
@@ -159,30 +181,30 @@ def test_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
 @pytest.mark.parametrize(
     ("start", "goal"), [(None, GOAL), (TILTED, GOAL), (GOAL, 5), (2, GOAL), (None, None), (None, 6)]
 )
-def test_straight_path_leads_between_any_two_ends(start: End, goal: End) -> None:
+def test_straight_path_leads_between_any_two_ends(start: StopAt, goal: StopAt) -> None:
     before = with_ends(open_state(OPTIMAL, TILTED), start, goal)
-    expected = ends_of(before)
+    expected = poses_of(before)
     state = Go().apply(before)
     journey = path_of(state)
     assert (journey.kind, journey.poses) == ("straight", expected)
     assert journey.poses[0] == (TILTED if start is None else expected[0])
     if isinstance(goal, Pose):
         assert journey.poses[1] == goal
-    assert journey.trajectory.duration == pytest.approx(STRAIGHT_SECONDS)
+    assert journey.trajectory.duration == pytest.approx(WATCH_SECONDS)
     assert state.pose == journey.poses[0]
 
 
 def test_goal_is_the_neighbouring_mode_until_one_is_chosen_and_stays_once_it_is_gone_to() -> None:
     state = open_state(OPTIMAL)
     assert (state.mode, goal_of(state)) == (1, 5)
-    end = SetPathTime(STRAIGHT_SECONDS).apply(Go().apply(state))
-    assert (end.mode, Paths.of(end).goal, goal_of(end)) == (5, 5, 5)
+    end = SetPathTime(WATCH_SECONDS).apply(Go().apply(state))
+    assert (end.mode, Paths.of(end).stops[1].at, goal_of(end)) == (5, 5, 5)
 
 
 @pytest.mark.parametrize(
     ("start", "goal"), [(None, TILTED), (GOAL, GOAL), (3, 3), (None, 1), (1, TILTED)]
 )
-def test_path_from_a_pose_to_itself_is_refused(start: End, goal: End) -> None:
+def test_path_from_a_pose_to_itself_is_refused(start: StopAt, goal: StopAt) -> None:
     state = with_ends(open_state(OPTIMAL, TILTED), start, goal)
     for kind in ("straight", "planned"):
         with pytest.raises(InputError, match="are the same pose: choose another goal"):
@@ -200,7 +222,7 @@ def test_path_between_poses_that_differ_by_rounding_is_refused() -> None:
 
 
 def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
-    state = SetPathTime(0.3 * STRAIGHT_SECONDS).apply(start_between(1, 4))
+    state = SetPathTime(0.3 * WATCH_SECONDS).apply(start_between(1, 4))
     again = Go().apply(state)
     for pose, before in zip(path_of(again).poses, path_of(state).poses, strict=True):
         np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
@@ -210,7 +232,7 @@ def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
     # A path whose ends have other leg lengths gives its own place no other legs.
     free = SetPathTime(4.0).apply(Go().apply(with_ends(open_state(OPTIMAL, TILTED), None, GOAL)))
     modes = forward(OPTIMAL, joints_of(OPTIMAL, free.pose))
-    assert ends_of(with_ends(free, None, 6))[1].position == pytest.approx(modes.position[6])
+    assert poses_of(with_ends(free, None, 6))[1].position == pytest.approx(modes.position[6])
 
 
 def test_path_is_of_its_design() -> None:
@@ -232,7 +254,7 @@ def test_path_is_of_its_design() -> None:
 def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
     state = start_between(1, 5)
     duration = path_of(state).trajectory.duration
-    assert duration == pytest.approx(STRAIGHT_SECONDS)
+    assert duration == pytest.approx(WATCH_SECONDS)
     for _ in range(4):
         state = AdvanceJourney(0.3 * duration).apply(state)
         assert state.pose == path_of(state).pose
@@ -318,7 +340,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     bench: Bench,
 ) -> None:
     bench.do(Set("design.limits", with_radius(OPTIMAL, 0.2).limits))
-    bench.do(Set("paths.goal", GOAL), Set("paths.kind", "planned"), Go())
+    bench.do(Set("paths.stops", (Stop(), Stop(GOAL))), Set("paths.kind", "planned"), Go())
     state = bench.wait_for_plan(1)
     assert Paths.of(state).problem is None
     journey = path_of(state)
@@ -377,12 +399,15 @@ def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) ->
     def values_of(handle: Any) -> dict[str, Any]:
         return {n: v for h, n, v in paths.updates(Frame(desk.state)) if h is handle}
 
-    assert values_of(time_slider)["disabled"] is True
+    assert values_of(time_slider)["visible"] is False
+    # Without a path no chart is drawn.
+    assert not any("<svg" in str(v) for *_, v in paths.updates(Frame(desk.state)))
     desk.click(paths.go)
     assert path_of(desk.state).is_playing
+    assert any("ex-course" in str(v) for *_, v in paths.updates(Frame(desk.state)))
     slider = values_of(time_slider)
-    assert slider["disabled"] is False
-    assert slider["max"] == pytest.approx(STRAIGHT_SECONDS, abs=0.011)
+    assert slider["visible"] is True
+    assert slider["max"] == pytest.approx(WATCH_SECONDS, abs=0.011)
     desk.press(buttons, "paths.play", "off")
     assert not path_of(desk.state).is_playing
     desk.press(buttons, "paths.play", "on")
@@ -407,7 +432,7 @@ def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) ->
     desk.press(buttons, "paths.clear")
     assert journey_of(desk.state) is None
     desk.press(buttons, "paths.kind", "planned")
-    desk.session.do(Set("paths.goal", GOAL))
+    desk.session.do(Set("paths.stops", (Stop(), Stop(GOAL))))
     desk.click(paths.go)
     assert Paths.of(desk.state).is_planning
     assert values_of(paths.go) == {"disabled": True}
@@ -415,35 +440,41 @@ def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) ->
     assert not Paths.of(desk.state).is_planning
 
 
-@pytest.mark.parametrize("end", ENDS)
-def test_end_is_the_present_pose_a_mode_or_six_numbers(
-    services: Services, desk: Desk, end: Literal["start", "goal"]
+def chosen(state: State, index: int) -> State:
+    return with_value(state, "paths.chosen", index)
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_pose_is_the_present_one_a_mode_or_six_numbers(
+    services: Services, desk: Desk, index: int
 ) -> None:
     paths = PathsPanel(services)
-    title, at = end.capitalize(), f"paths.{end}"
     desk.session.do(SetPose(TILTED))
+    desk.session.do(Set("paths.stops", (Stop(), Stop(3))))
 
     def controls() -> dict[str, Any]:
         controls = controls_of(services, paths, desk.state)
         return {label: handle for label, handle in controls.items() if handle.visible}
 
     def numbers() -> Pose:
-        return ends_of(desk.state)[ENDS.index(end)]
+        return poses_of(desk.state)[index]
 
-    typed = (f"{title} x, y, z (units)", f"{title} angles (°)")
+    typed = ("Pose x, y, z (units)", "Pose angles (°)")
+    assert not {"Pose", "Pause (s)", *typed} & {*controls()}
+    desk.press(services.buttons, "paths.choose", str(index))
     assert not {*typed} & {*controls()}
     for mode, option in enumerate(MODES):
-        desk.use(controls()[title], option)
-        assert value_at(desk.state, at) == mode
+        desk.use(controls()["Pose"], option)
+        assert value_at(desk.state, f"paths.stops.{index}.at") == mode
         expected = forward(OPTIMAL, joints_of(OPTIMAL, TILTED)).position[mode]
         assert numbers().position == pytest.approx(expected)
         x = f"{numbers().position[0]:.2f}".replace("-", "−")
-        assert x in end_numbers(desk.state, end)
+        assert x in numbers_of(desk.state, mode)
     # Typed numbers begin as those that were shown, and each of the six can be set.
     before = numbers()
-    desk.use(controls()[title], TYPED)
+    desk.use(controls()["Pose"], TYPED)
     steps = len(desk.session.history.steps)
-    assert value_at(desk.state, at) == before
+    assert numbers() == before
     assert {*typed} <= {*controls()}
     desk.use(controls()[typed[0]], (9.0, 4.0, 8.0))
     desk.use(controls()[typed[1]], (-70.0, 10.0, 5.0))
@@ -451,11 +482,125 @@ def test_end_is_the_present_pose_a_mode_or_six_numbers(
     assert numbers().position == (9.0, 4.0, 8.0)
     assert angles_of(numbers()) == pytest.approx((-70.0, 10.0, 5.0))
     assert controls()[typed[1]].value == (-70.0, 10.0, 5.0)
-    desk.use(controls()[title], PRESENT)
+    desk.use(controls()["Pause (s)"], 0.3)
+    assert stops_of(desk.state)[index].pause == 0.3
+    desk.use(controls()["Pose"], PRESENT)
     assert numbers() == TILTED
     desk.session.do(SetPose(GOAL))
-    # The start goes with the platform, the goal stays behind.
-    assert numbers() == (GOAL if end == "start" else TILTED)
+    # The first goes with the platform, another stays behind.
+    assert numbers() == (TILTED if index else GOAL)
+    desk.press(services.buttons, "paths.choose", str(index))
+    assert "Pose" not in controls()
+
+
+def test_poses_are_added_copied_moved_and_removed() -> None:
+    state = open_state(OPTIMAL, TILTED)
+    assert [stop.at for stop in stops_of(state)] == [None, state.mode ^ 4]
+    # The first press keeps the present pose, the next ones add those of the platform.
+    taught = add_present(state).apply(state)
+    assert Paths.of(taught).stops == (Stop(TILTED),)
+    taught = SetPose(GOAL).apply(taught)
+    taught = add_present(taught).apply(taught)
+    assert poses_of(taught) == (TILTED, GOAL)
+    # Behind the chosen one.
+    between = SetPosition(2, 8.0).apply(chosen(taught, 0))
+    between = add_present(between).apply(between)
+    assert poses_of(between) == (TILTED, between.pose, GOAL)
+    copied = copy_stop(between, 2).apply(between)
+    assert poses_of(copied)[2:] == (GOAL, GOAL)
+    assert Paths.of(copied).chosen == 3
+    changed = set_stop(copied, "", at=TILTED, pause=0.5)
+    assert changed is not None
+    changed = changed.apply(copied)
+    assert stops_of(changed)[3] == Stop(TILTED, 0.5)
+    lifted = lift_stop(changed, 3)
+    assert lifted is not None
+    assert poses_of(lifted.apply(changed)) == (TILTED, between.pose, TILTED, GOAL)
+    assert lift_stop(changed, 0) is None
+    for _ in range(5):
+        changed = remove_stop(changed, 0).apply(changed)
+    assert Paths.of(changed).stops == (Stop(),)
+    # A goal that is only proposed becomes one when it is copied.
+    proposed = copy_stop(state, 1).apply(state)
+    assert [type(stop.at) for stop in stops_of(proposed)] == [type(None), int, Pose]
+    assert poses_of(proposed)[1] == poses_of(proposed)[2]
+    full = with_value(state, "paths.stops", (Stop(TILTED),) * MOST_STOPS)
+    with pytest.raises(InputError, match="explorer drives takes longer ones"):
+        add_present(full).apply(full)
+    with pytest.raises(InputError, match="only the first pose"):
+        Set("paths.stops", (Stop(), Stop())).apply(state)
+    with pytest.raises(InputError, match="a pause must not be below zero"):
+        Stop(TILTED, -0.1)
+
+
+def test_closed_path_between_modes_is_told_with_its_singular_poses() -> None:
+    state = with_ends(open_state(OPTIMAL, TILTED), 1, 5)
+    closed = close_path(state)
+    assert closed is not None
+    state = Go().apply(closed.apply(state))
+    assert close_path(state) is None
+    assert path_of(state).is_closed
+    words = crossing_words(path_of(state), UNITS)
+    assert "Closed path through modes 1 → 5 → 1. Singular 2 times: δ1 = 0" in words
+    start = path_of(state).poses[0]
+    assert SetPathTime(1e9).apply(state).pose == start
+    # Half way through, modes are still those of the legs at its poses.
+    on_the_way = SetPathTime(0.3 * WATCH_SECONDS).apply(state)
+    again = zip(poses_of(on_the_way), path_of(state).poses, strict=True)
+    for pose, before in again:
+        np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
+    plain = crossing_words(path_of(Go().apply(with_ends(state, TILTED, GOAL))), UNITS)
+    assert "Closed" not in plain
+
+
+def test_poses_and_pauses_are_taken_from_a_table() -> None:
+    state = open_state(OPTIMAL)
+    head = b"x_mm,y_mm,z_mm,yaw_deg,pitch_deg,roll_deg,pause_s"
+    table = b"%b\n100,50,90,-70,5,0,0.2\n120,50,90,-70,5,0,\n" % head
+    taken = stops_in_table(state, table, "pick.csv").apply(state)
+    expected = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-70.0, 5.0, 0.0))
+    assert [stop.pause for stop in stops_of(taken)] == [0.2, 0.0]
+    assert poses_of(taken)[0].position == pytest.approx(expected.position)
+    np.testing.assert_allclose(poses_of(taken)[0].rotation, expected.rotation, atol=1e-12)
+    assert path_of(Go().apply(taken)).pauses == (0.2, 0.0)
+    for data, words in (
+        (b"x,y\n1,2\n", "no column z"),
+        (b"x,y,z\n" + 51 * b"1,2,3\n", "at most 50"),
+        (b"x,y,z,time_s\n1,2,3,0\n", "a path in time already"),
+    ):
+        with pytest.raises(InputError, match=words):
+            stops_in_table(state, data, "pick.csv")
+
+
+def test_chosen_pose_has_the_only_handle_and_is_dragged_by_it(services: Services) -> None:
+    handle, state = StopHandle(services), open_state(OPTIMAL, TILTED)
+    platform = DragHandle(services)
+
+    def visible(state: State) -> list[bool]:
+        placed = Placed(Frame(state))
+        found = [*handle.updates(placed), *platform.updates(placed)]
+        return [value for _, name, value in found if name == "visible"]
+
+    state = with_value(state, "paths.stops", (Stop(TILTED), Stop(GOAL)))
+    assert visible(state) == [False, True]
+    state = chosen(state, 1)
+    assert visible(state) == [True, False]
+    assert visible(Go().apply(state)) == [False, True]
+
+
+def test_pauses_of_a_planned_path_are_at_its_poses(services: Services) -> None:
+    del services
+    between = Pose.of_yaw_pitch_roll((12.0, 2.0, 8.0), (-73.0, 5.0, 0.0))
+    stops = (Stop(None, 0.1), Stop(between, 0.2), Stop(GOAL, 0.3))
+    state = Set("paths.stops", stops).apply(Set("paths.kind", "planned").apply(open_state(OPTIMAL)))
+    state, jobs = Go().apply(state), StubJobs()
+    runner = PathRunner(services_for(jobs=jobs))
+    runner.follow(Frame(state))
+    (order,) = jobs.orders
+    corners, places = order.task(*order.arguments)
+    assert [corners[place] for place in places] == [*poses_of(state)]
+    assert places[0] == 0
+    assert places[-1] == len(corners) - 1
 
 
 def test_mode_at_a_singular_pose_is_refused_in_words_or_a_pose_with_the_same_legs() -> None:
@@ -463,13 +608,13 @@ def test_mode_at_a_singular_pose_is_refused_in_words_or_a_pose_with_the_same_leg
     for mode in range(8):
         state = with_ends(open_state(OPTIMAL, flat), None, mode)
         if forward(OPTIMAL, joints_of(OPTIMAL, flat)).feasible:
-            goal = ends_of(state)[1]
+            goal = poses_of(state)[1]
             expected = pytest.approx(joints_of(OPTIMAL, flat), abs=1e-6)
             assert joints_of(OPTIMAL, goal) == expected
         else:
             with pytest.raises(InputError, match="edge of what closes"):
-                ends_of(state)
-            assert "ex-close" in end_numbers(state, "goal")
+                poses_of(state)
+            assert "ex-close" in numbers_of(state, mode)
 
 
 # Loads along a path
@@ -494,7 +639,7 @@ def straight(*more: Action, force: Triple = DOWN) -> State:
     state = open_state(PRESS, START)
     for action in (
         Set("view.forces.force", force),
-        Set("paths.goal", FAR),
+        Set("paths.stops", (Stop(), Stop(FAR))),
         Set("paths.holds_load", True),
         Set("paths.seconds", 20.0),
         *more,
@@ -516,7 +661,8 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces() -> None:
     jobs = StubJobs()
     PathRunner(services_for(jobs=jobs)).follow(Frame(state))
     (order,) = jobs.orders
-    poses = order.task(*order.arguments).poses
+    poses, places = order.task(*order.arguments)
+    assert places == (0, len(poses) - 1)
     weights = weights_of_parts((PRESS, 3000.0)).with_payload(PRESS)
     along = path_loads(PRESS, poses, state.load, tool=state.tool, weights=weights)
     assert 0.5 < along.utilisation <= 1.0 + 1e-4
@@ -545,26 +691,65 @@ def drives_request(state: State) -> DrivesRequest:
     return request
 
 
-def test_drives_of_the_path_are_requested_once_it_is_there_and_wanted() -> None:
+def test_drives_are_those_of_the_path_as_it_is_played_and_exported() -> None:
     state = with_ends(open_state(OPTIMAL), None, GOAL)
-    wanted = Set("paths.drives", "duration").apply(state)
-    assert request_for(wanted) is None
-    assert request_for(Go().apply(state)) is None
-    design, path = drives_request(Go().apply(wanted))
-    assert design == OPTIMAL
-    assert path.poses == path_of(Go().apply(state)).poses
-    assert path.duration == 1.0
-    shortest = Set("paths.drives", "shortest").apply(Go().apply(wanted))
-    assert drives_request(shortest)[1].duration is None
+    assert request_for(state) is None
+    state = Go().apply(state)
+    for law, seconds in (("watchable", WATCH_SECONDS), ("duration", 1.0)):
+        state = SetLaw("paths.law", law).apply(state)
+        design, path = drives_request(state)
+        found, journey = drives_along(design, path), path_of(state)
+        assert found.law.duration == pytest.approx(seconds, rel=1e-12)
+        assert journey.trajectory.duration == found.law.duration
+        time, joints = journey.trajectory.time, journey.trajectory.joints
+        gone = np.trapezoid(found.at(time).speed, time, axis=0)
+        np.testing.assert_allclose(gone / OPTIMAL.unit_mm, joints[-1] - joints[0], atol=1e-3)
     with pytest.raises(InputError, match="a path needs a time above zero"):
-        Set("paths.duration", 0.0).apply(wanted)
+        Set("paths.duration", 0.0).apply(state)
+
+
+def test_change_of_the_law_keeps_the_place_on_the_path() -> None:
+    state = SetPathTime(3.0).apply(Go().apply(with_ends(open_state(OPTIMAL), None, GOAL)))
+    before = path_of(state)
+    fast = SetLaw("paths.law", "duration").apply(SetLaw("paths.duration", 0.5).apply(state))
+    after = path_of(fast)
+    assert after.trajectory.duration == pytest.approx(0.5)
+    assert after.at == pytest.approx(3.0 * 0.5 / WATCH_SECONDS)
+    assert after.pose.position == pytest.approx(before.pose.position, abs=1e-6)
+    assert fast.pose == state.pose
+    back = SetLaw("paths.law", "watchable").apply(fast)
+    assert path_of(back).at == pytest.approx(3.0)
+
+
+def test_law_that_there_is_not_is_told_and_the_path_takes_a_time_to_watch() -> None:
+    state = Set("paths.law", "shortest").apply(Go().apply(with_ends(open_state(OPTIMAL), 1, 5)))
+    assert path_of(state).trajectory.duration == pytest.approx(WATCH_SECONDS)
+    assert "In the time asked for there is no law" in path_title(state, None)
+    assert str(path_of(state).problem) in path_title(state, None)
+    paused = replace(path_of(state), pauses=(0.6, 0.6))
+    asked = Set("paths.law", "duration").apply(
+        with_value(state, "paths.journey", replace(paused, seconds=1.0))
+    )
+    assert "the pauses take 1.2 s of the 1 s" in path_title(asked, None)
+    assert path_of(asked).trajectory.duration == pytest.approx(WATCH_SECONDS + 1.2)
+
+
+def test_playback_is_slower_than_the_path_only_if_told() -> None:
+    state = Go().apply(with_ends(open_state(OPTIMAL), None, GOAL))
+    assert "slower" not in path_chip(Frame(state)) + path_title(state, None)
+    assert path_of(AdvanceJourney(1.0).apply(state)).at == 1.0
+    slow = Set("paths.slower", 10.0).apply(state)
+    assert path_of(AdvanceJourney(1.0).apply(slow)).at == pytest.approx(0.1)
+    for words in (path_chip(Frame(slow)), path_title(slow, None)):
+        assert "10 times slower" in words
 
 
 def test_drives_are_drawn_or_the_reason_is_told_in_a_sentence() -> None:
-    wanted = Set("paths.drives", "duration").apply(with_ends(open_state(OPTIMAL), None, GOAL))
-    html = drives_html(draw_drives(drives_request(Go().apply(wanted))))
+    html = drives_html(
+        draw_drives(drives_request(Go().apply(with_ends(open_state(OPTIMAL), None, GOAL))))
+    )
     assert "One motor for all six needs at least" in html
     # A line of each actuator in the three charts over time and in that of force and speed.
     assert html.count('<path d="M') == 24
-    between = Set("paths.drives", "duration").apply(start_between(0, 3))
+    between = start_between(0, 3)
     assert "leaves the limits" in drives_html(draw_drives(drives_request(between)))

@@ -32,9 +32,11 @@ from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.orientation.feature import OrientationPanel, OrientationScene
 from explorer.app.features.orientation.work import TILTS_FEED, SetTiltTorsion
 from explorer.app.features.paths.actions import Go
+from explorer.app.features.paths.editor import TYPED, numbers_of
 from explorer.app.features.paths.feature import PathScene
-from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
-from explorer.app.features.paths.state import Paths, journey_of
+from explorer.app.features.paths.panel import PathsPanel
+from explorer.app.features.paths.state import Stop, journey_of
+from explorer.app.features.paths.stops import chosen_pose
 from explorer.app.features.sharing.scene_files import caption_of
 from explorer.app.features.singularity.feature import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
@@ -186,11 +188,11 @@ def test_words_and_numbers_are_those_of_the_point() -> None:
         there = tool_of(SetMode(mode).apply(state))
         np.testing.assert_allclose([number(cell) for cell in cells[1:4]], there, atol=0.06)
     caption = caption_of(state, dt.date(2026, 1, 1)).partition("the tool at (")[2]
-    numbers = re.sub("<.*?>", "", end_numbers(state, "start"))
-    for text in (caption.partition(")")[0], numbers.partition(" units ·")[0]):
+    numbers = re.sub("<.*?>", "", numbers_of(state, None))
+    for text in (caption.partition(")")[0], numbers.partition(" ·")[0]):
         shown = [number(part) for part in text.split(", ")]
         np.testing.assert_allclose(shown, tool_of(state), atol=0.06)
-    assert "x, y, z of the tool" in end_numbers(state, "start")
+    assert "x, y, z of the tool in units" in numbers_of(state, None)
 
 
 # The scene
@@ -261,7 +263,7 @@ def test_ball_is_about_the_tool_and_touches_where_the_tool_is_singular(
 
 def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
     state = state_at(pose=None)
-    state = Go().apply(Set("paths.goal", TILTED).apply(state))
+    state = Go().apply(Set("paths.stops", (Stop(), Stop(TILTED))).apply(state))
     journey = journey_of(state)
     assert journey is not None
     placed = Placed(Frame(state))
@@ -287,8 +289,7 @@ def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
     np.testing.assert_allclose(points[:, 0], expected, rtol=0.0, atol=1e-5)
 
 
-@pytest.mark.parametrize("end", ["Start", "Goal"])
-def test_typed_end_of_a_path_is_where_the_tool_is(services: Services, desk: Desk, end: str) -> None:
+def test_typed_pose_of_a_path_is_where_the_tool_is(services: Services, desk: Desk) -> None:
     panel = PathsPanel(services)
     desk.session.do(Set("design", with_tool(OPTIMAL)))
     desk.session.do(Set("view.at", "tool"))
@@ -297,21 +298,22 @@ def test_typed_end_of_a_path_is_where_the_tool_is(services: Services, desk: Desk
         return controls_of(services, panel, desk.state)
 
     def typed() -> State:
-        pose = getattr(Paths.of(desk.state), end.lower())
-        assert isinstance(pose, Pose)
+        pose = chosen_pose(desk.state)
+        assert pose is not None
         return replace(desk.state, pose=pose)
 
-    desk.use(controls()[end], TYPED)
+    desk.press(services.buttons, "paths.choose", "1")
+    desk.use(controls()["Pose"], TYPED)
     before = typed()
     np.testing.assert_allclose(
-        controls()[f"{end} x, y, z (units)"].value, tool_of(before), atol=1e-12
+        controls()["Pose x, y, z (units)"].value, tool_of(before), atol=1e-12
     )
-    desk.use(controls()[f"{end} x, y, z (units)"], (9.0, 4.0, 8.0))
+    desk.use(controls()["Pose x, y, z (units)"], (9.0, 4.0, 8.0))
     assert typed().pose.quaternion == before.pose.quaternion
-    desk.use(controls()[f"{end} angles (°)"], (-70.0, 10.0, 5.0))
+    desk.use(controls()["Pose angles (°)"], (-70.0, 10.0, 5.0))
     np.testing.assert_allclose(tool_of(typed()), (9.0, 4.0, 8.0), atol=1e-12)
     assert angles_of(typed().pose) == pytest.approx((-70.0, 10.0, 5.0))
-    assert controls()[f"{end} x, y, z (units)"].value == (9.0, 4.0, 8.0)
+    assert controls()["Pose x, y, z (units)"].value == (9.0, 4.0, 8.0)
 
 
 def test_undo_leads_back_to_the_point_of_each_step_and_leaves_the_rest_of_the_view(

@@ -9,6 +9,7 @@ from playwright.sync_api import Browser, expect
 from tab import Tab
 
 from explorer.app.features.paths.actions import Go
+from explorer.app.features.paths.state import Stop
 from explorer.app.server import Running
 from explorer.app.state.actions import Set
 from explorer.mechanism.design_file import PRESETS
@@ -106,8 +107,7 @@ def test_bar_of_any_window_shows_the_verdict_and_all_buttons_and_cuts_no_figure(
 def test_charts_of_a_path_are_no_wider_than_a_phone(browser: Browser, running: Running) -> None:
     for path, value in (
         ("design.actuators.speed_mm_s", (200.0,) * 6),
-        ("paths.goal", HIGHER),
-        ("paths.drives", "duration"),
+        ("paths.stops", (Stop(), Stop(HIGHER))),
     ):
         running.page.session.do(Set(path, value))
     running.page.session.do(Go())

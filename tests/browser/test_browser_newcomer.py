@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import re
 import zipfile
@@ -14,6 +15,7 @@ from newcomer import Newcomer, hue, numbers
 from playwright.sync_api import expect
 from tab import Tab
 
+from explorer.app.features.paths.state import journey_of
 from explorer.app.features.prototype.work import export_simulation
 from explorer.app.features.requirement.state import Required
 from explorer.app.scene.placing import Placed
@@ -142,9 +144,10 @@ def test_three_designs_are_compared_by_volume_and_overlay(newcomer: Newcomer) ->
 
 def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.MonkeyPatch) -> None:
     # So long that even a slow browser can stop it on the way.
-    monkeypatch.setattr("explorer.app.features.paths.state.STRAIGHT_SECONDS", 600.0)
+    monkeypatch.setattr("explorer.app.features.paths.state.WATCH_SECONDS", 600.0)
     newcomer.open("Paths")
-    newcomer.choose("Goal", "Mode 7: + + +")
+    newcomer.press("Pose 2")
+    newcomer.choose("Pose", "Mode 7: + + +")
     newcomer.press("Go")
     newcomer.button(re.compile("^Playing ")).wait_for()
     # The first of the time may read 0.
@@ -156,17 +159,46 @@ def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.Monk
     words = newcomer.page.locator(".ex-course text").all_text_contents()
     assert {"0", "200", "400", "flat"} <= {*words}
     assert 0.0 < float(newcomer.field("Time (s)").input_value()) < 600.0
-    assert newcomer.presses_for() == 5
+    assert newcomer.presses_for() == 6
     newcomer.press("Home pose")
     expect(newcomer.field("roll (°)")).to_have_value("0")
-    newcomer.choose("Goal", "Present pose")
-    newcomer.type("Goal x, y, z (mm) z", "80")
+    newcomer.press("Pose 2")
+    newcomer.choose("Pose", "Present pose")
+    newcomer.type("Pose x, y, z (mm) z", "80")
     newcomer.press("Without singularity")
     newcomer.press("Go")
     newcomer.sees(re.compile("^Planned path of"))
     newcomer.sees(re.compile("^No singular pose;"))
     expect(newcomer.field("z")).to_have_value(re.compile(r"^80(\.0+)?$"))
-    assert newcomer.presses_for() == 7
+    assert newcomer.presses_for() == 8
+
+
+def test_pick_and_place_with_a_lift_is_played_and_exported_as_it_is_timed_in_20_presses(
+    newcomer: Newcomer, data_tab: Tab
+) -> None:
+    newcomer.open("Paths")
+    expect(newcomer.page.locator(".ex-course:visible")).to_have_count(0)
+    newcomer.press("Add the present pose")
+    for number, axis, value in ((1, "z", "110"), (2, "x", "140"), (3, "z", "90")):
+        newcomer.press(f"Copy pose {number}, to change the copy")
+        newcomer.type(f"Pose x, y, z (mm) {axis}", value)
+    newcomer.choose("Time law", "In a given time")
+    newcomer.type("Duration (s)", "0.5")
+    newcomer.press("Go")
+    newcomer.sees("Takes 0.5 s.")
+    newcomer.sees("Actuators along the path, 0.5 s")
+    expect(newcomer.field("Time (s)")).to_have_value("0.5")
+    with newcomer.page.expect_download() as download:
+        newcomer.press("Export CSV")
+    assert newcomer.presses_for() <= 20
+    rows = [*csv.DictReader(io.StringIO(Path(download.value.path()).read_text("utf-8")))]
+    assert float(rows[-1]["time_s"]) == pytest.approx(0.5)
+    places = np.array([[float(row[f"{axis} [mm]"]) for axis in "xyz"] for row in rows])
+    for corner in ((100, 50, 90), (100, 50, 110), (140, 50, 110), (140, 50, 90)):
+        assert np.abs(places - corner).max(axis=1).min() < 0.1
+    journey = journey_of(data_tab.state)
+    assert journey is not None
+    assert (journey.at, journey.is_playing) == (pytest.approx(0.5), False)
 
 
 def test_prototype_is_shown_and_exported(newcomer: Newcomer, data_tab: Tab) -> None:

@@ -37,7 +37,7 @@ BROKEN = ".broken"
 # Number of other sessions kept of explorers that have ended, the newest ones.
 MOST_ORPHANS = 10
 # The schema of the files.
-SCHEMA = 5
+SCHEMA = 6
 # Largest number of steps in a file.
 MOST_STEPS = 50
 # Field with the name of a part of the state within another value.

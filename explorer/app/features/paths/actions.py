@@ -4,58 +4,60 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import ClassVar
 
-import numpy as np
-
 from explorer.app.features.loads.load import weights_of_parts
-from explorer.app.features.paths.state import End, Journey, Paths, journey_of
+from explorer.app.features.paths.state import Journey, Paths, StopAt, journey_of
+from explorer.app.features.paths.stops import poses_of, stops_of
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.moves import move_to
 from explorer.app.state.parts import with_value
-from explorer.app.state.state import Joints, State, joints_of
+from explorer.app.state.state import State
 from explorer.app.state.view import Weighed
 from explorer.errors import InputError
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import forward
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.number_text import format_number
-from explorer.paths.planning import PlannedPath, plan_path
+from explorer.paths.planning import plan_path
 from explorer.statics.loaded import LoadedPose
-
-# Leg lengths that differ by less, over the reach, are the same.
-SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class Go(Action):
-    """Play the straight path between the chosen ends, or request one without a singularity."""
+    """Play the straight path along the poses of the list, or request one without a singularity."""
 
     def apply(self, state: State) -> State:
         """Return the next state: at the start of the path and playing, or planning it.
 
         Raises:
-            InputError: Both ends are the same pose, or an end is a mode that the present leg
-                lengths do not have.
+            InputError: All poses are the same, or one is a mode that the present leg lengths do
+                not have.
         """
-        paths, ends = Paths.of(state), ends_of(state)
-        if not StraightMoves.along(ends).have_length(state.design.reach).any():
+        # A mode that follows the present one would be another one once the platform moves.
+        stops, poses = stops_of(state), poses_of(state)
+        if not StraightMoves.along(poses).have_length(state.design.reach).any():
             raise InputError(
-                "the start and the goal are the same pose: choose another goal, or press Play to "
+                "the poses of the path are the same pose: choose another goal, or press Play to "
                 "see the last path again"
             )
-        # A goal that follows the present mode would be another one as soon as the platform moves.
-        chosen = goal_of(state)
-        if paths.kind == "planned":
-            after = _with(state, goal=chosen, problem=None, journey=None)
-            return _with(after, request=paths.request + 1, planning=ends)
-        title = f"{_end_words(paths.start).capitalize()} to {_end_words(chosen)}"
-        path = Journey("straight", title, state.design, ends, is_playing=True, tool=state.tool)
-        after = _with(state, goal=chosen, problem=None, planning=None, journey=path)
-        after = move_to(after, ends[0])
-        return replace(after, mode=paths.start) if isinstance(paths.start, int) else after
+        if Paths.of(state).kind == "planned":
+            after = _with(state, stops=stops, chosen=None, problem=None, journey=None)
+            return _with(after, request=Paths.of(state).request + 1, planning=poses)
+        pauses, start = tuple(stop.pause for stop in stops), stops[0].at
+        ends = f"{_words(start).capitalize()} to {_words(stops[-1].at)}"
+        title = ends if len(stops) == 2 else f"Path of {len(stops)} poses"
+        path = Journey(
+            *("straight", title, state.design, poses),
+            is_playing=True,
+            tool=state.tool,
+            pauses=pauses,
+        )
+        after = _with(state, stops=stops, chosen=None, problem=None, planning=None, journey=path)
+        after = move_to(after, poses[0])
+        return replace(after, mode=start) if isinstance(start, int) else after
 
     def describe(self, after: State) -> str:
         """Return which path was played or requested."""
@@ -64,61 +66,23 @@ class Go(Action):
 
 
 @dataclass(frozen=True)
-class SetEnd(Set):
-    """Set an end of the next path; all numbers that are typed for one end are one step."""
+class SetLaw(Set):
+    """Set what the time of the path depends on; the platform stays where it is on it."""
 
-    repeats: ClassVar[bool] = True
-
-
-def goal_of(state: State) -> Pose | int:
-    """Return the goal of the next path; where none is chosen, the mode beyond δ1 = 0."""
-    goal = Paths.of(state).goal
-    return state.mode ^ 4 if goal is None else goal
-
-
-def ends_of(state: State) -> tuple[Pose, Pose]:
-    """Return the poses between which the next path leads; errors are those of `pose_of_end`."""
-    return pose_of_end(state, Paths.of(state).start), pose_of_end(state, goal_of(state))
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        before, after = journey_of(state), super().apply(state)
+        journey = journey_of(after)
+        if before is None or journey is None:
+            return after
+        at = journey.time_at(before.place_at(before.at))
+        return _with(after, journey=replace(journey, at=at))
 
 
-def pose_of_end(state: State, end: End) -> Pose:
-    """Return the pose of an end: itself, a mode of the present leg lengths, or the present pose.
-
-    Raises:
-        InputError: The present leg lengths do not close in other modes, to rounding.
-    """
-    if end is None:
-        return state.pose
-    if isinstance(end, Pose):
-        return end
-    solution = forward(state.design, _legs(state))
-    if not solution.feasible:
-        raise InputError(
-            "the present leg lengths lie at the edge of what closes, where all modes are one; "
-            "move the platform away from the singular pose"
-        )
-    return Pose.of(solution.position[end], solution.rotation[end])
-
-
-def _legs(state: State) -> Joints:
-    """Return the leg lengths whose modes are the ends of a path.
-
-    During a straight path between two modes of equal leg lengths, they are those lengths.
-    """
-    journey = journey_of(state)
-    if journey is not None and journey.kind == "straight" and journey.pose == state.pose:
-        first, last = (joints_of(state.design, pose) for pose in journey.poses)
-        if np.abs(np.subtract(first, last)).max() <= SAME * state.design.reach:
-            return first
-    return joints_of(state.design, state.pose)
-
-
-def _end_words(end: End) -> str:
-    if end is None:
+def _words(at: StopAt) -> str:
+    if at is None:
         return "present pose"
-    if isinstance(end, Pose):
-        return "typed pose"
-    return f"mode {end}"
+    return "typed pose" if isinstance(at, Pose) else f"mode {at}"
 
 
 @dataclass(frozen=True)
@@ -159,7 +123,7 @@ class Play(Action):
 
 @dataclass(frozen=True)
 class AdvanceJourney(Action):
-    """Advance a path that is playing by some seconds, until its end."""
+    """Advance a path that is playing by some seconds of playback, until its end."""
 
     continues: ClassVar[bool] = True
 
@@ -170,7 +134,8 @@ class AdvanceJourney(Action):
         journey = journey_of(state)
         if journey is None or not journey.is_playing:
             return state
-        at = min(journey.at + self.seconds, journey.trajectory.duration)
+        passed = self.seconds / Paths.of(state).slower
+        at = min(journey.at + passed, journey.trajectory.duration)
         after = replace(journey, at=at, is_playing=at < journey.trajectory.duration)
         return _go_along(state, after)
 
@@ -217,14 +182,16 @@ def _with(state: State, **changes: object) -> State:
 
 def plan(
     design: Design,
-    ends: tuple[Pose, Pose],
+    poses: tuple[Pose, ...],
     seconds: float,
     tool: Triple | None,
     load: Six | None,
     weighed: Weighed,
     density: float,
-) -> PlannedPath:
-    """Return a path between two poses, as `explorer.paths.planning.plan_path` finds it.
+) -> tuple[tuple[Pose, ...], tuple[int, ...]]:
+    """Return a path along poses, as `explorer.paths.planning.plan_path` finds it between two.
+
+    It is given by its corners, with the index of each of the poses among them.
 
     If there is a load to hold, the weights of bodies act besides; the density of the parts is in
     kg/m³.
@@ -233,5 +200,11 @@ def plan(
     if load is not None:
         if weighed == "payload and legs":
             own = weights_of_parts((design, density))
-        weights = LoadedPose(design, ends[0], load, own, weighed != "none").weights
-    return plan_path(design, *ends, seconds=seconds, tool=tool, load=load, weights=weights)
+        weights = LoadedPose(design, poses[0], load, own, weighed != "none").weights
+    corners, places = [poses[0]], [0]
+    for ends in pairwise(poses):
+        if ends[0] != ends[1]:
+            path = plan_path(design, *ends, seconds=seconds, tool=tool, load=load, weights=weights)
+            corners += path.poses[1:]
+        places.append(len(corners) - 1)
+    return tuple(corners), tuple(places)

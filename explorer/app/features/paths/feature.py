@@ -9,8 +9,10 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, Tab, show
 from explorer.app.features.paths.actions import AdvanceJourney, Play, TakePlan, plan
-from explorer.app.features.paths.panel import PathsPanel
+from explorer.app.features.paths.editor import StopHandle
+from explorer.app.features.paths.panel import PathsPanel, slow_words
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
+from explorer.app.features.paths.stops import stops_of
 from explorer.app.features.paths.work import DRIVES_FEED
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
@@ -20,12 +22,11 @@ from explorer.app.widgets.buttons import activity, press_button
 from explorer.app.widgets.chips import StateCommand
 from explorer.jobs.jobs import LongJob
 from explorer.mechanism.configuration import position_of
-from explorer.mechanism.pose import rotation_from_quaternion
+from explorer.mechanism.pose import Pose, rotation_from_quaternion
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.page.session.clock import Ticker
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key
-from explorer.paths.planning import PlannedPath
 from explorer.singularity.colours import FAR, SINGULAR
 
 # Number of crossings that are drawn at most.
@@ -78,7 +79,10 @@ def path_chip(frame: Frame) -> str:
         return ""
     pause = press_button("paths.play", "off", "Pause", class_name="ex-button")
     share = journey.at / journey.trajectory.duration
-    return activity("Paths", "Playing", f"{format_decimals(journey.at, 1)} s", share, pause)
+    words = f"{format_decimals(journey.at, 1)} s"
+    if slow := slow_words(state):
+        words += f", {slow}"
+    return activity("Paths", "Playing", words, share, pause)
 
 
 class PathRunner(Runner):
@@ -114,10 +118,16 @@ class PathRunner(Runner):
         load = state.load if paths.holds_load else None
         weighed, density = view.forces.weighed, view.prototype.density
 
-        def take_path(path: PlannedPath) -> None:
-            moves = len(path.poses) - 1
+        stops = stops_of(state)
+
+        def take_path(path: tuple[tuple[Pose, ...], tuple[int, ...]]) -> None:
+            corners, places = path
+            moves, pauses = len(corners) - 1, [0.0] * len(corners)
+            for stop, place in zip(stops, places, strict=True):
+                pauses[place] += stop.pause
             title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
-            journey = Journey("planned", title, design, path.poses, is_playing=True, tool=tool)
+            kinds = "planned", title, design, corners
+            journey = Journey(*kinds, is_playing=True, tool=tool, pauses=tuple(pauses))
             self._finish(number, journey, None)
 
         self._job = self._jobs.start(
@@ -157,7 +167,7 @@ PATHS = Feature(
         "Singular once": "The path goes through a singular pose, where the platform is not held.",
         "No path": "No path was found that keeps what was asked for.",
     },
-    scene=(PathScene,),
+    scene=(PathScene, StopHandle),
     later_feeds=(DRIVES_FEED,),
     runners=(PathRunner,),
     commands=(

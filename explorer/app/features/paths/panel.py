@@ -1,77 +1,58 @@
-"""Paths, straight or planned: their ends, and the controls that make, play and export them."""
+"""Paths, straight or planned: the list of poses, and what makes, plays and exports a path."""
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from html import escape
-from typing import Literal
 
 import viser
 
-from explorer.app.features.feature import Services, show_html
-from explorer.app.features.paths import actions, plots
-from explorer.app.features.paths.drives import DrivesPanel
-from explorer.app.features.paths.state import End, PathKind, Paths, journey_of
-from explorer.app.inputs.bindings import ControlBinding
+from explorer.app.features.feature import Services, html_of, show_html
+from explorer.app.features.paths import actions, plots, stops
+from explorer.app.features.paths.editor import StopsEditor
+from explorer.app.features.paths.state import PathKind, Paths, journey_of
+from explorer.app.features.paths.work import DRIVES_FEED, DrivesDrawing
+from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
-from explorer.app.state.actions import Action, Set
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, angles_of
+from explorer.app.state.state import State
 from explorer.app.widgets import markup
+from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import extra_button, press_button
 from explorer.app.widgets.chips import Chips, StateCommand, choose
-from explorer.errors import InputError
+from explorer.errors import ExplorerError, InputError
 from explorer.export.tables import trajectory_csv
 from explorer.files.extras import is_missing
-from explorer.mechanism.configuration import position_of
 from explorer.mechanism.margins import margins, mode_name, mode_of
-from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.number_text import (
-    format_decimals,
-    format_fitted,
-    format_number,
-    snap_to_decimals,
-)
+from explorer.numerics.number_text import format_number
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key
 
-EndName = Literal["start", "goal"]
-ENDS: tuple[EndName, ...] = ("start", "goal")
-HINTS: dict[EndName, str] = {
-    "start": (
-        "The pose in which the path begins: the present one, an assembly mode of the present leg "
-        "lengths by the signs of δ1 δ2 δ3, or typed numbers, which begin with those shown."
-    ),
-    "goal": (
-        "The pose in which the path ends: an assembly mode of the present leg lengths by the "
-        "signs of δ1 δ2 δ3, the present pose, which is kept as numbers, or typed numbers."
-    ),
+LAWS = {
+    "Slow enough to watch": "watchable",
+    "In a given time": "duration",
+    "In the shortest time": "shortest",
 }
-PRESENT, TYPED = "Present pose", "Typed numbers"
-MODES = tuple(f"Mode {mode}:  {mode_name(mode)}" for mode in range(8))
-OPTIONS: dict[EndName, tuple[str, ...]] = {
-    "start": (PRESENT, *MODES, TYPED),
-    "goal": (*MODES, PRESENT, TYPED),
-}
+SLOWER = {"Real time": 1.0, "10 times slower": 10.0, "100 times slower": 100.0}
 KINDS: dict[PathKind, tuple[str, str]] = {
     "straight": (
         "Straight",
-        "Move the point straight from start to goal; limits and collisions are not checked.",
+        "Move the point straight from pose to pose; limits and collisions are not checked.",
     ),
     "planned": (
         "Without singularity",
-        "Search for a path that keeps all limits, margins and clearances.",
+        "Search for a path along the poses that keeps all limits, margins and clearances.",
     ),
 }
 CANCEL = Set("paths.planning", None, "Planning", "stopped")
 CLEAR = Set("paths.journey", None, "Path", "cleared")
-# Decimals of typed angles and coordinates.
-DECIMALS = 9
 
 
 class PathsPanel:
-    """The ends and the kind of a path, and the path that was made, with its margins."""
+    """The poses and the kind of a path, and the path that was made, in its one time."""
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
@@ -81,11 +62,15 @@ class PathsPanel:
             kind: StateCommand(f"Paths › {words}", hint, *choose("paths.kind", kind, "Path"))
             for kind, (words, hint) in KINDS.items()
         }
-        self._missing = extra_button("planning") if is_missing("planning") else ""
+        self._feed = services.get(DRIVES_FEED)
+        self._missing = {
+            extra: extra_button(extra) if is_missing(extra) else ""
+            for extra in ("planning", "timing")
+        }
         self._kind_chips = Chips(services.buttons, services.session, "paths.kind", "", kinds)
         gui.add_html(markup.beside(2))
         with gui.add_folder("Path"):
-            self._numbers = [self._add_end(gui, end) for end in ENDS]
+            self._editor = StopsEditor(services, self._controls)
             self._kinds = gui.add_html("")
             self._controls.checkbox(
                 "Hold the load",
@@ -97,7 +82,7 @@ class PathsPanel:
             self._demand = gui.add_html("")
             self.go = self._controls.button(
                 "Go",
-                "Make the path from the start to the goal, and play it.",
+                "Make the path along the poses, and play it.",
                 actions.Go,
                 icon=viser.Icon.ROUTE,
                 main=True,
@@ -111,22 +96,44 @@ class PathsPanel:
                 step=0.1,
                 visible=_is_planned,
             )
-        with gui.add_folder("Playback"):
+        with gui.add_folder("Time"):
+            self._controls.dropdown(
+                "Time law",
+                "Time that the path takes, in playback, charts, files and motors alike. The "
+                "platform rests at every pose.",
+                LAWS,
+                At("paths.law", action=actions.SetLaw),
+            )
+            self._controls.number(
+                "Duration (s)",
+                "Time that the path takes with its pauses: in each move the fastest actuator "
+                "accelerates over one half of its travel and brakes over the other, always by the "
+                "same.",
+                At("paths.duration", action=actions.SetLaw),
+                least=0.01,
+                step=0.01,
+                visible=lambda state: Paths.of(state).law == "duration",
+            )
+            self._controls.dropdown(
+                "Playback",
+                "Play in the time of the path, or slower, which the bar then tells.",
+                SLOWER,
+                "paths.slower",
+            )
             self._title = gui.add_html("")
             self.time = self._controls.slider(
                 "Time (s)",
-                "Time on the path. A straight path takes 8 s; on a planned one the fastest "
-                "actuator moves a tenth of the reach per second.",
+                "Time on the path.",
                 ControlBinding(
                     lambda frame: journey.at if (journey := journey_of(frame.state)) else 0.0,
                     lambda _, value: actions.SetPathTime(value),
                 ),
                 _time_span,
-                disabled=lambda state: journey_of(state) is None,
+                visible=lambda state: journey_of(state) is not None,
             )
             self._margins = gui.add_html("", visible=False)
         with gui.add_folder("Drives"):
-            self._drives = DrivesPanel(services, self._controls)
+            self._drives = gui.add_html("")
         services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
         services.do_on_press("paths.cancel", lambda _: CANCEL)
         self._clear = services.link(
@@ -155,11 +162,9 @@ class PathsPanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         state = frame.state
-        for end, handle in zip(ENDS, self._numbers, strict=True):
-            is_typed = _is_typed(state, end)
-            yield from show_html(handle, "" if is_typed else end_numbers(state, end))
+        yield from self._editor.updates(frame)
         chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
-        missing = self._missing if Paths.of(state).kind == "planned" else ""
+        missing = self._missing["planning"] if Paths.of(state).kind == "planned" else ""
         kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>', missing)
         yield self._kinds, "content", kinds
         yield self.go, "disabled", Paths.of(state).is_planning
@@ -167,41 +172,17 @@ class PathsPanel:
         yield self._title, "content", title
         yield from show_html(self._demand, plots.demand_note(state))
         journey = journey_of(state)
-        margins = "" if journey is None else plots.margins_html(journey, state.unit)
-        yield from show_html(self._margins, margins)
-        yield from self._drives.updates(frame)
+        chart = "" if journey is None else plots.margins_html(journey, state.unit)
+        yield from show_html(self._margins, chart)
+        yield self._drives, "content", self._drives_html(state)
         yield from self._controls.updates(frame)
 
-    def _add_end(self, gui: viser.GuiApi, end: EndName) -> viser.GuiHtmlHandle:
-        title = end.capitalize()
-        self._controls.dropdown(
-            title,
-            HINTS[end],
-            OPTIONS[end],
-            ControlBinding(
-                lambda frame: _option(frame.state, end),
-                lambda state, chosen: _choose(state, end, chosen),
-            ),
-        )
-        numbers = gui.add_html("")
-        place = "Coordinates of b4 or of the tool point in the base frame."
-        turn = "Yaw, pitch and roll of the platform, in degrees."
-        for index, words, hint, step in (
-            (0, "x, y, z ({unit})", place, 0.01),
-            (1, "angles (°)", turn, 0.1),
-        ):
-            self._controls.triple(
-                f"{title} {words}",
-                hint,
-                ControlBinding(
-                    lambda frame, index=index: typed_numbers(frame.state, end)[index],
-                    lambda state, triple, index=index: _set_typed(state, end, index, triple),
-                ),
-                step=step,
-                power=1 - index,
-                visible=lambda state: _is_typed(state, end),
-            )
-        return numbers
+    def _drives_html(self, state: State) -> str:
+        if journey_of(state) is None:
+            return markup.box(markup.dim("What a path asks of the motors, once there is one."))
+        if Paths.of(state).law == "shortest" and self._missing["timing"]:
+            return self._missing["timing"]
+        return html_of(self._feed, drives_html, "Drives")
 
     def _export(self, _: str, client: viser.ClientHandle) -> None:
         state = self._session.latest_state()
@@ -212,31 +193,26 @@ class PathsPanel:
             self._downloads.send(client.client_id, f"{journey.design.name}-path.csv", data)
 
 
-def end_numbers(state: State, end: EndName) -> str:
-    """Return the six numbers of an end that is not typed, as HTML."""
-    try:
-        pose = actions.pose_of_end(state, _end(state, end))
-    except InputError as error:
-        return f'<div class="ex-note ex-close">{escape(markup.sentence(str(error)))}</div>'
-    there = position_of(state.design, pose, state.view.at)
-    unit, size = state.unit, state.unit.convert(state.design.reach)
-    position = ", ".join(format_fitted(unit.convert(x), size, 4) for x in there)
-    angles = ", ".join(f"{format_decimals(angle, 1)}°" for angle in angles_of(pose))
-    hint = f"x, y, z of {state.point}; yaw, pitch, roll"
-    return markup.note(f'<span title="{hint}">{position} {unit.name} · {angles}</span>')
+@lru_cache(2)
+def drives_html(drawing: DrivesDrawing | ExplorerError) -> str:
+    """Return the actuators' speeds, forces and powers along a path, or why none, as HTML."""
+    if isinstance(drawing, ExplorerError):
+        return markup.alert("No speeds and forces", markup.sentence(str(drawing)))
+    return f'{render(drawing.blocks)}<div class="ex-map ex-drives">{drawing.charts}</div>'
 
 
 def kind_note(state: State) -> str:
-    """Return whether a path of the chosen kind exists between the ends, as HTML."""
+    """Return whether a path of the chosen kind exists along the poses, as HTML."""
     if Paths.of(state).kind == "straight":
         return markup.dim("May pass singular poses, which are marked.")
     try:
-        ends = actions.ends_of(state)
+        poses = stops.poses_of(state)
     except InputError:
         return ""
-    start, goal = (int(mode_of(margins(end.position, end.rotation))) for end in ends)
+    start, *others = (int(mode_of(margins(p.position, p.rotation))) for p in poses)
+    goal = next((mode for mode in others if mode != start), start)
     if start == goal:
-        return markup.dim(f"Both ends are in mode {start} ({mode_name(start)}).")
+        return markup.dim(f"All poses are in mode {start} ({mode_name(start)}).")
     words = f"There is none from mode {start} to mode {goal}."
     return f'<span class="ex-close" title="Every path between two modes is singular">{words}</span>'
 
@@ -258,7 +234,7 @@ def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") 
     """Return the title of the path, its crossings and loads, and its buttons, as HTML."""
     journey = journey_of(state)
     if journey is None:
-        return markup.box(markup.dim("No path yet. Choose a goal and press Go."))
+        return markup.box(markup.dim("No path yet. Add poses and press Go."))
     on, words, hint = (
         ("off", "Pause", "Stop here") if journey.is_playing else ("on", "Play", "Move along it")
     )
@@ -267,64 +243,30 @@ def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") 
         "paths.export",
         "",
         "CSV",
-        hint="Save time, joints and pose, evenly spaced in time; lengths in design units",
+        hint="Save time, joints and pose, evenly spaced in time; lengths as the page shows them",
         label="Export CSV",
         class_name="ex-button",
     )
     title = escape(journey.title)
+    duration = format_number(journey.trajectory.duration, 3)
+    times = f"Takes {duration} s" + (f", played {slow}" if (slow := slow_words(state)) else "")
+    if journey.problem is not None:
+        what = "In the time asked for there is no law, so it is slow enough to watch"
+        times = f"{times}. {what}: {journey.problem}"
+    look = "" if journey.problem is None else "ex-close"
     return markup.box(
         f'<div class="ex-line">{play}<span class="ex-cut ex-fill" title="{title}">{title}</span>'
         f"{export}{clear}</div>",
+        f'<div class="{look}">{escape(markup.sentence(times))}</div>',
         plots.crossing_words(journey, state.unit),
         "" if loads is None else plots.load_words(loads),
     )
 
 
-def _end(state: State, end: EndName) -> End:
-    return Paths.of(state).start if end == "start" else actions.goal_of(state)
-
-
-def _option(state: State, end: EndName) -> str:
-    chosen = _end(state, end)
-    if chosen is None:
-        return PRESENT
-    return TYPED if isinstance(chosen, Pose) else MODES[chosen]
-
-
-def _choose(state: State, end: EndName, option: str) -> Action:
-    value: End = None
-    if option in MODES:
-        value = MODES.index(option)
-    elif option == TYPED:
-        value = actions.pose_of_end(state, _end(state, end))
-    elif end == "goal":
-        # It is of use once the platform has moved away.
-        value = state.pose
-    return actions.SetEnd(f"paths.{end}", value, end.capitalize(), option)
-
-
-def _is_typed(state: State, end: EndName) -> bool:
-    return isinstance(_end(state, end), Pose)
-
-
-def typed_numbers(state: State, end: EndName) -> tuple[Triple, Triple]:
-    """Return position, of b4 or of the tool point, and angles of a typed end; zeros for another."""
-    chosen = _end(state, end)
-    if not isinstance(chosen, Pose):
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    there = position_of(state.design, chosen, state.view.at)
-    x, y, z = (snap_to_decimals(coordinate, DECIMALS, state.design.reach) for coordinate in there)
-    yaw, pitch, roll = (snap_to_decimals(angle, DECIMALS, 180.0) for angle in angles_of(chosen))
-    return (x, y, z), (yaw, pitch, roll)
-
-
-def _set_typed(state: State, end: EndName, index: int, triple: Triple) -> Action:
-    """Set the position of an end, or with index 1 its angles."""
-    pose, there = actions.pose_of_end(state, _end(state, end)), triple
-    if index:
-        there = position_of(state.design, pose, state.view.at)
-        pose = Pose.of_yaw_pitch_roll(pose.position, triple)
-    return actions.SetEnd(f"paths.{end}", state.pose_at(there, pose), end.capitalize(), TYPED)
+def slow_words(state: State) -> str:
+    """Return by how much playback is slower than the path, in words; "" if it is not."""
+    times = Paths.of(state).slower
+    return "" if times == 1.0 else f"{format_number(times)} times slower"
 
 
 def _is_planned(state: State) -> bool:

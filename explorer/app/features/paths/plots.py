@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 from html import escape
+from itertools import groupby
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
@@ -20,7 +21,7 @@ from explorer.app.widgets.markup import margin_name, note, swatch
 from explorer.export.drawings.charts import Chart, ends_of
 from explorer.export.drawings.markup import circle, drawing_text, line, page_picture
 from explorer.measures.blocks.block import MOST_SHARE, Share
-from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
+from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins, mode_of
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
 from explorer.mechanism.rgb import ORANGE, css
 from explorer.numerics.arrays import FloatArray
@@ -120,8 +121,8 @@ def margins_over(journey: Journey, unit: Unit) -> tuple[FloatArray, FloatArray, 
 
 def crossing_time(journey: Journey, index: int) -> float:
     """Return the time of a crossing of the path, in seconds."""
-    crossing, trajectory = journey.margins.crossings[index], journey.trajectory
-    return float(np.interp(crossing.move + crossing.share, trajectory.at, trajectory.time))
+    crossing = journey.margins.crossings[index]
+    return journey.time_at(crossing.move + crossing.share)
 
 
 def legend(pose: Pose, unit: Unit) -> str:
@@ -138,7 +139,7 @@ def legend(pose: Pose, unit: Unit) -> str:
 
 
 def crossing_words(journey: Journey, unit: Unit) -> str:
-    """Return where the path is singular, in one line of HTML, with a unit of lengths."""
+    """Return where the path is singular, and through which modes it goes, in one line of HTML."""
     along_path = journey.margins
     places = [
         f"δ{c.incidence} = 0 at {format_decimals(crossing_time(journey, i), 2)} s"
@@ -146,6 +147,12 @@ def crossing_words(journey: Journey, unit: Unit) -> str:
         for i, c in enumerate(along_path.crossings)
     ]
     places += [f"δ{index} = 0 along a whole move" for index in along_path.lies_in]
+    modes = [int(mode_of(margins(p.position, p.rotation))) for p in journey.poses]
+    along = [mode for mode, _ in groupby(modes)]
+    closed = "Closed path" if journey.is_closed else ""
+    if len(along) > 1:
+        closed = f"{closed or 'Path'} through modes {' → '.join(map(str, along))}"
+    closed = f"{closed}. " if closed else ""
     if not places:
         index = int(np.argmin(along_path.least))
         return (
@@ -156,7 +163,7 @@ def crossing_words(journey: Journey, unit: Unit) -> str:
     listed = "; ".join(places[:MOST_LISTED]) + (f"; and {more} more" if more > 0 else "")
     times = "once" if len(places) == 1 else f"{len(places)} times"
     dot = swatch(ORANGE, "ex-dot")
-    return f"<div>{dot}Singular {times}: {listed}</div>"
+    return f"<div>{dot}{closed}Singular {times}: {listed}</div>"
 
 
 class LoadsAlong:
@@ -175,7 +182,7 @@ class LoadsAlong:
         journey, loaded = journey_of(frame.state), self._loads.of(frame)
         if journey is None or not has_limits(loaded.design):
             return None
-        path = journey.kind, journey.design, journey.poses, journey.tool
+        path = journey.design, journey.path
         key = *path, loaded.load, loaded.weights
         if key != self._key:
             demanded = DemandedLoad.of(journey.design, loaded.load, loaded.weights)

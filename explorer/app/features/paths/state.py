@@ -1,48 +1,74 @@
-"""The path that is played on the page, and the settings of the next one.
+"""The path that is played on the page, the poses of the next one, and the one law of its time.
 
-A path is the straight move between two poses, which may be singular on the way, or was planned
-without a singularity; b4 or the tool point goes along lines. It belongs to the design that it was
-made for; with another design there is none.
+A path is a list of poses, with straight moves from each to the next, which may be singular on the
+way, or planned without a singularity; b4 or the tool point goes along lines. It rests at every
+pose, for a pause if one is given. It belongs to the design that it was made for; with another
+design there is none.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Literal, Self, TypeAlias
+from typing import Literal, NamedTuple, Self, TypeAlias
 
 import msgspec
 import numpy as np
 
 from explorer.app.state.parts import LENGTHS, TRANSIENT, FeaturePart
 from explorer.app.state.state import Mode, State
-from explorer.errors import InputError
+from explorer.errors import ExplorerError, InputError
 from explorer.legs.moves import StraightMoves, poses_between
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
+from explorer.motion.masses import DENSITY
 from explorer.numerics.number_text import format_number
 from explorer.paths.crossings import PathMargins, path_margins
+from explorer.paths.drives import TimedPath, law_of_path
 from explorer.paths.planning import DEFAULT_SECONDS
-from explorer.paths.time_law import law_at_speed
-from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
+from explorer.paths.trajectory import DEFAULT_SAMPLES, Trajectory, trajectory
 
 PathKind = Literal["straight", "planned"]
-"""The straight move between two poses, or a path without a singular pose."""
+"""The straight moves between the poses, or a path without a singular pose."""
 
-PathDrives = Literal["off", "shortest", "duration"]
-"""Whether speeds and forces along the path are computed, and in which time."""
+PathLaw = Literal["watchable", "duration", "shortest"]
+"""The time of a path: slow enough to watch, a given one, or the shortest within the limits."""
 
-End: TypeAlias = Pose | Mode | None
-"""An end of a path: a fixed pose, or an assembly mode of the present leg lengths.
-
-As the start None is the present pose, as the goal the mode beyond δ1 = 0 from the present one.
-"""
+StopAt: TypeAlias = Pose | Mode | None
+"""Where a path stops: in a fixed pose, an assembly mode of the present leg lengths, or, as the
+first, in the present pose for None."""
 
 # Number of paths whose margins and times are cached: the present one and the one before.
 MOST_CACHED = 2
-# Duration of a straight path: between modes the legs move too little for a speed to give one.
-STRAIGHT_SECONDS = 8.0
+# Duration of a path that is slow enough to watch, and the least time of each of its moves.
+WATCH_SECONDS, MOVE_SECONDS = 8.0, 1.0
+# Samples of each move, and the most poses in the list.
+MOVE_SAMPLES, MOST_STOPS = 50, 50
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A pose of the next path, and the pause in it in seconds.
+
+    Raises:
+        InputError: The pause is below zero or not finite.
+    """
+
+    at: StopAt = field(default=None, metadata=LENGTHS)
+    pause: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.pause < math.inf:
+            raise InputError(f"a pause must not be below zero; got {self.pause:g} s")
+
+
+class Course(NamedTuple):
+    """A path in time, and why it takes another time than it was asked to; None if it does not."""
+
+    timed: Trajectory
+    problem: str | None
 
 
 @dataclass(frozen=True)
@@ -50,6 +76,11 @@ class Journey:
     """A path by its corners, and the time in seconds up to which it has been played.
 
     Its moves are straight for the tool point in the platform frame, or for b4 if there is none.
+
+    Attributes:
+        pauses: Pauses at the corners in seconds, one for each.
+        seconds: Duration that it is asked to take, pauses included; None for the shortest.
+        density: Density of the parts in kg/m³, for the forces of which the shortest time depends.
 
     Raises:
         InputError: Fewer than two corners, or all of them are the same pose.
@@ -62,6 +93,9 @@ class Journey:
     at: float = 0.0
     is_playing: bool = field(default=False, metadata=TRANSIENT)
     tool: Triple | None = None
+    pauses: tuple[float, ...] = ()
+    seconds: float | None = WATCH_SECONDS
+    density: float = DENSITY
 
     def __post_init__(self) -> None:
         if len(self.poses) < 2:
@@ -71,10 +105,25 @@ class Journey:
             raise InputError("the path has no length: it needs two poses that differ")
 
     @property
+    def path(self) -> TimedPath:
+        """The path with its time, as playback, charts, files and motors take it."""
+        return TimedPath(self.poses, self.seconds, self.tool, self.density, pauses=self.pauses)
+
+    @property
     def trajectory(self) -> Trajectory:
-        """The path over time; a straight one is slow enough to watch."""
-        seconds = STRAIGHT_SECONDS if self.kind == "straight" else None
-        return _trajectory(self.design, self.poses, seconds, self.tool)
+        """The path over time."""
+        return _course(self.design, self.path).timed
+
+    @property
+    def problem(self) -> str | None:
+        """Why it has no law of the time that it is asked to take; None if it has one."""
+        return _course(self.design, self.path).problem
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it ends in the pose in which it begins, to rounding."""
+        ends = StraightMoves.along((self.poses[0], self.poses[-1]), self.tool)
+        return not ends.have_length(self.design.reach).any()
 
     @property
     def margins(self) -> PathMargins:
@@ -88,13 +137,22 @@ class Journey:
 
     def pose_at(self, seconds: float) -> Pose:
         """Return the pose at a time in seconds; each corner is kept to the last bit."""
-        timed = self.trajectory
-        at = float(np.interp(seconds, timed.time, timed.at))
+        at = self.place_at(seconds)
         move = min(int(at), len(self.poses) - 2)
         if at - move in (0.0, 1.0):
             return self.poses[move + int(at - move)]
         ends = self.poses[move], self.poses[move + 1]
         return Pose.of(*poses_between(*ends, at - move, self.tool))
+
+    def place_at(self, seconds: float) -> float:
+        """Return the place at a time: the number of the move plus the share of it."""
+        timed = self.trajectory
+        return float(np.interp(seconds, timed.time, timed.at))
+
+    def time_at(self, place: float) -> float:
+        """Return the time in seconds at a place."""
+        timed = self.trajectory
+        return float(np.interp(place, timed.at, timed.time))
 
 
 @dataclass(frozen=True)
@@ -102,26 +160,31 @@ class Paths(FeaturePart, name="paths"):
     """The path of the page, and the settings of the next one.
 
     Attributes:
+        stops: Poses of the next path; after a single one it goes to the mode beyond δ1 = 0.
+        chosen: Index of the pose that is edited; None if none is.
         seconds: Longest time of planning, in seconds.
-        drives: Time law for which speeds and forces of the actuators are computed, or off.
+        law: Which time the path takes.
         duration: The given time of the path, in seconds.
+        slower: Seconds that playback takes for each second of the path.
         request: Number of the last request to plan; 0 before the first.
-        planning: Start and goal of the path that is being planned; None if none is.
+        planning: Poses of the path that is being planned; None if none is.
         problem: Why planning failed; None if it did not.
 
     Raises:
-        InputError: A time for planning or for the path that is not above zero.
+        InputError: A time for planning or for the path that is not above zero, no pose or too many,
+            or one after the first that follows the present one.
     """
 
-    start: End = field(default=None, metadata=LENGTHS)
-    goal: End = field(default=None, metadata=LENGTHS)
+    stops: tuple[Stop, ...] = field(default=(Stop(),), metadata=LENGTHS)
+    chosen: int | None = None
     kind: PathKind = "straight"
     seconds: float = DEFAULT_SECONDS
     holds_load: bool = False
-    drives: PathDrives = "off"
+    law: PathLaw = "watchable"
     duration: float = 1.0
+    slower: float = 1.0
     request: int = field(default=0, metadata=TRANSIENT)
-    planning: tuple[Pose, Pose] | None = field(default=None, metadata=TRANSIENT)
+    planning: tuple[Pose, ...] | None = field(default=None, metadata=TRANSIENT)
     problem: str | None = field(default=None, metadata=TRANSIENT)
     journey: Journey | None = None
 
@@ -131,6 +194,13 @@ class Paths(FeaturePart, name="paths"):
                 raise InputError(
                     f"{what} needs a time above zero; got {format_number(seconds)} seconds"
                 )
+        if not 1 <= len(self.stops) <= MOST_STOPS:
+            raise InputError(
+                f"a path on the page has 1 to {MOST_STOPS} poses; got {len(self.stops)}: "
+                "explorer drives takes longer ones"
+            )
+        if None in [stop.at for stop in self.stops[1:]]:
+            raise InputError("only the first pose of a path can be the present one")
 
     def on_open(self) -> Self:
         """Return the part for another design: the settings of the next path."""
@@ -152,16 +222,29 @@ class Paths(FeaturePart, name="paths"):
 
 
 def journey_of(state: State) -> Journey | None:
-    """Return the present path; None where there is none, or one made for another design.
+    """Return the present path in its time; None without one, or if made for another design.
 
     It stays while a payload and actuators are chosen for it.
     """
-    journey, new = Paths.of(state).journey, state.design
-    if journey is None or journey.design == new:
+    paths, new = Paths.of(state), state.design
+    journey = paths.journey
+    if journey is None:
+        return None
+    if journey.design != new:
+        carrying = {"payload": new.payload, "actuators": new.actuators}
+        if msgspec.structs.replace(journey.design, **carrying) != new:
+            return None
+    watched = watchable_seconds(journey.poses, journey.pauses)
+    seconds = {"watchable": watched, "duration": paths.duration, "shortest": None}[paths.law]
+    density = state.view.prototype.density
+    if (journey.design, journey.seconds, journey.density) == (new, seconds, density):
         return journey
-    carrying = {"payload": new.payload, "actuators": new.actuators}
-    is_for_it = msgspec.structs.replace(journey.design, **carrying) == new
-    return replace(journey, design=new) if is_for_it else None
+    return replace(journey, design=new, seconds=seconds, density=density)
+
+
+def watchable_seconds(poses: Sequence[Pose], pauses: Sequence[float]) -> float:
+    """Return the time of a path that is slow enough to watch, with its pauses."""
+    return max(WATCH_SECONDS, MOVE_SECONDS * (len(poses) - 1)) + sum(pauses)
 
 
 def is_playing(state: State) -> bool:
@@ -171,12 +254,18 @@ def is_playing(state: State) -> bool:
 
 
 @lru_cache(maxsize=MOST_CACHED)
-def _trajectory(
-    design: Design, poses: tuple[Pose, ...], seconds: float | None, tool: Triple | None
-) -> Trajectory:
-    law = law_at_speed(design, StraightMoves.along(poses, tool), DEFAULT_SPEED * design.reach)
-    law = law if seconds is None else law.lasting(seconds)
-    return trajectory(design, poses, law=law, tool=tool)
+def _course(design: Design, path: TimedPath) -> Course:
+    """Return a path in its time; one that has no law for it takes a time to watch."""
+    problem, moves = None, len(path.poses) - 1
+    try:
+        law = law_of_path(design, path)
+    except ExplorerError as error:
+        problem = str(error)
+        watched = path._replace(duration=watchable_seconds(path.poses, path.pauses))
+        law = law_of_path(design, watched)
+    samples = max(DEFAULT_SAMPLES, MOVE_SAMPLES * moves + 1)
+    timed = trajectory(design, path.poses, law=law, samples=samples, tool=path.tool)
+    return Course(timed, problem)
 
 
 @lru_cache(maxsize=MOST_CACHED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from explorer.app.features.paths.state import Paths, journey_of
+from explorer.app.features.paths.state import journey_of
 from explorer.app.session.feed import FeedOf
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
@@ -28,13 +28,9 @@ class DrivesDrawing:
 
 
 def request_for(state: State) -> DrivesRequest | None:
-    """Return the path of a state if speeds and forces along it are wanted, else None."""
-    journey, paths = journey_of(state), Paths.of(state)
-    if journey is None or paths.drives == "off":
-        return None
-    duration = paths.duration if paths.drives == "duration" else None
-    density = state.view.prototype.density
-    return journey.design, TimedPath(journey.poses, duration, journey.tool, density)
+    """Return the path of a state in its time; None without a path."""
+    journey = journey_of(state)
+    return None if journey is None else (journey.design, journey.path)
 
 
 def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:

@@ -1,0 +1,289 @@
+"""The list of the poses of a path with its buttons, the fields of one, and its handle."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from html import escape
+
+import numpy as np
+import viser
+
+from explorer.app.features.feature import Services, follow_drags, show_html
+from explorer.app.features.paths import stops
+from explorer.app.features.paths.state import Paths, Stop, StopAt
+from explorer.app.inputs.bindings import ControlBinding
+from explorer.app.inputs.controls import Controls
+from explorer.app.scene.placing import Placed, ScenePart, scene_scale
+from explorer.app.state.actions import Action
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, angles_of
+from explorer.app.widgets import markup
+from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.chips import StateCommand
+from explorer.errors import InputError
+from explorer.mechanism.configuration import position_of
+from explorer.mechanism.margins import mode_name
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.number_text import (
+    format_decimals,
+    format_fitted,
+    format_number,
+    snap_to_decimals,
+)
+from explorer.page.widgets.assigning import Updates
+
+PRESENT, TYPED = "Present pose", "Typed numbers"
+MODES = tuple(f"Mode {mode}:  {mode_name(mode)}" for mode in range(8))
+OPTIONS = (PRESENT, *MODES, TYPED)
+# Decimals of typed angles and coordinates.
+DECIMALS = 9
+ZERO: Triple = (0.0, 0.0, 0.0)
+# Size of the handle in the scene, smaller than that of the platform.
+HANDLE_SCALE = 1.3
+
+
+class StopsEditor:
+    """The list of poses, and the fields of the one that is chosen."""
+
+    def __init__(self, services: Services, controls: Controls) -> None:
+        gui, session = services.gui, services.session
+        self._list = gui.add_html("")
+        controls.dropdown(
+            "Pose",
+            "The chosen pose of the list: the present one, an assembly mode of the present leg "
+            "lengths by the signs of δ1 δ2 δ3, or numbers, typed or by its handle in the scene. "
+            "Present, the first one follows the platform, and the others are kept as numbers.",
+            OPTIONS,
+            ControlBinding(lambda frame: _option(frame.state), _choose),
+            visible=_is_chosen,
+        )
+        for index, words, hint, step in (
+            (0, "x, y, z ({unit})", "Coordinates of b4 or of the tool point in the base.", 0.01),
+            (1, "angles (°)", "Yaw, pitch and roll of the platform, in degrees.", 0.1),
+        ):
+            controls.triple(
+                f"Pose {words}",
+                hint,
+                ControlBinding(
+                    lambda frame, index=index: typed_numbers(frame.state)[index],
+                    lambda state, triple, index=index: _set_typed(state, index, triple),
+                ),
+                step=step,
+                power=1 - index,
+                visible=lambda state: stops.chosen_pose(state) is not None,
+            )
+        controls.number(
+            "Pause (s)",
+            "Time for which the platform rests in the chosen pose.",
+            ControlBinding(
+                lambda frame: stop.pause if (stop := _stop(frame.state)) else 0.0,
+                lambda state, pause: stops.set_stop(
+                    state, f"pause {format_number(pause)} s", pause=pause
+                ),
+            ),
+            least=0.0,
+            step=0.1,
+            visible=_is_chosen,
+        )
+        changes: dict[str, Callable[[State, int], Action | None]] = {
+            "choose": lambda state, i: stops.ChooseStop(None if stops.chosen_of(state) == i else i),
+            "copy": stops.copy_stop,
+            "lift": stops.lift_stop,
+            "remove": stops.remove_stop,
+        }
+
+        def on_row(name: str, change: Callable[[State, int], Action | None]) -> None:
+            def of_row(value: str) -> Callable[[State], Action | None] | None:
+                index = int(value) if value.isdecimal() else -1
+
+                def change_row(state: State) -> Action | None:
+                    return change(state, index) if 0 <= index < len(stops.stops_of(state)) else None
+
+                return change_row
+
+            services.do_on_press(f"paths.{name}", of_row)
+
+        for name, change in changes.items():
+            on_row(name, change)
+        self._acts = [
+            services.link(
+                "paths.add",
+                StateCommand(
+                    "Paths › Add the present pose",
+                    "Add the present pose to the path, after the chosen one or as the last.",
+                    stops.add_present,
+                ),
+            ),
+            services.link(
+                "paths.close",
+                StateCommand(
+                    "Paths › Back to the first pose",
+                    "End the path in its first pose.",
+                    stops.close_path,
+                ),
+            ),
+        ]
+        upload = gui.add_upload_button(
+            "Poses from a file …",
+            color="gray",
+            icon=viser.Icon.UPLOAD,
+            mime_type="text/csv",
+            hint="A table of poses such as explorer inverse --poses reads (CSV); a column pause_s "
+            "has the pauses.",
+        )
+
+        @upload.on_upload
+        def _(event: viser.GuiEvent[viser.GuiUploadButtonHandle]) -> None:
+            data, name = upload.value.content, upload.value.name
+            session.do(lambda state: stops.stops_in_table(state, data, name), who=event.client_id)
+
+    def updates(self, frame: Frame) -> Updates:
+        """Yield the updates that make the list show the frame."""
+        acts = f'<div class="ex-ends">{"".join(self._acts)}</div>'
+        yield from show_html(self._list, markup.box(list_stops(frame.state), acts))
+
+
+def list_stops(state: State) -> str:
+    """Return the poses of the next path as rows of HTML; the chosen one is marked."""
+    listed, own = stops.stops_of(state), len(Paths.of(state).stops)
+    chosen = stops.chosen_of(state)
+    return "".join(
+        _row(state, index, stop, is_chosen=index == chosen, is_own=index < own)
+        for index, stop in enumerate(listed)
+    )
+
+
+def _row(state: State, index: int, stop: Stop, *, is_chosen: bool, is_own: bool) -> str:
+    number, acts = index + 1, ""
+    for name, sign, words, is_there in (
+        ("copy", "+", f"Copy pose {number}, to change the copy", True),
+        ("lift", "↑", f"Move pose {number} up", index > 0 and is_own),
+        ("remove", "×", f"Remove pose {number}", is_own),
+    ):
+        acts += press_button(
+            f"paths.{name}",
+            index,
+            sign,
+            hint=words,
+            label=words,
+            class_name="ex-link",
+            is_disabled=not is_there,
+        )
+    what = "present pose" if stop.at is None else f"mode {stop.at}"
+    name = "" if isinstance(stop.at, Pose) else f"{what}: "
+    pause = f" · {format_number(stop.pause)} s" if stop.pause else ""
+    words = press_button(
+        "paths.choose",
+        index,
+        f"{number}. {name}{numbers_of(state, stop.at)}{pause}",
+        hint="Change this pose",
+        label=f"Pose {number}",
+        class_name="ex-fill ex-cut",
+        is_on=is_chosen,
+    )
+    look = "ex-row is-here" if is_chosen else "ex-row" if is_own else "ex-row ex-dim"
+    return f'<div class="{look}">{words}<span class="ex-ends">{acts}</span></div>'
+
+
+def numbers_of(state: State, at: StopAt) -> str:
+    """Return the six numbers of a pose of the path, or why there are none, as HTML."""
+    try:
+        pose = stops.pose_of(state, at)
+    except InputError as error:
+        return f'<span class="ex-close">{escape(markup.sentence(str(error)))}</span>'
+    there = position_of(state.design, pose, state.view.at)
+    unit, size = state.unit, state.unit.convert(state.design.reach)
+    position = ", ".join(format_fitted(unit.convert(x), size, 4) for x in there)
+    angles = ", ".join(f"{format_decimals(angle, 1)}°" for angle in angles_of(pose))
+    hint = f"x, y, z of {state.point} in {unit.name}; yaw, pitch, roll"
+    return f'<span title="{hint}">{position} · {angles}</span>'
+
+
+def typed_numbers(state: State) -> tuple[Triple, Triple]:
+    """Return position, of b4 or of the tool point, and angles of the chosen pose, or zeros."""
+    pose = stops.chosen_pose(state)
+    if pose is None:
+        return ZERO, ZERO
+    there = position_of(state.design, pose, state.view.at)
+    x, y, z = (snap_to_decimals(coordinate, DECIMALS, state.design.reach) for coordinate in there)
+    yaw, pitch, roll = (snap_to_decimals(angle, DECIMALS, 180.0) for angle in angles_of(pose))
+    return (x, y, z), (yaw, pitch, roll)
+
+
+def _set_typed(state: State, index: int, triple: Triple) -> Action | None:
+    """Set the position of the chosen pose, or with index 1 its angles."""
+    pose, there = stops.chosen_pose(state), triple
+    if pose is None:
+        return None
+    if index:
+        there = position_of(state.design, pose, state.view.at)
+        pose = Pose.of_yaw_pitch_roll(pose.position, triple)
+    return stops.set_stop(state, TYPED, at=state.pose_at(there, pose))
+
+
+def _stop(state: State) -> Stop | None:
+    chosen = stops.chosen_of(state)
+    return None if chosen is None else stops.stops_of(state)[chosen]
+
+
+def _is_chosen(state: State) -> bool:
+    return stops.chosen_of(state) is not None
+
+
+def _option(state: State) -> str:
+    stop = _stop(state)
+    if stop is None or stop.at is None:
+        return PRESENT
+    return TYPED if isinstance(stop.at, Pose) else MODES[stop.at]
+
+
+def _choose(state: State, option: str) -> Action | None:
+    stop, chosen = _stop(state), stops.chosen_of(state)
+    if stop is None:
+        return None
+    at: StopAt = None
+    if option in MODES:
+        at = MODES.index(option)
+    elif option == TYPED:
+        at = stops.pose_of(state, stop.at)
+    elif chosen:
+        # It is of use once the platform has moved away.
+        at = state.pose
+    return stops.set_stop(state, option, at=at)
+
+
+class StopHandle(ScenePart):
+    """The gizmo at the chosen pose of the list: arrows move the pose, arcs turn it."""
+
+    def __init__(self, services: Services) -> None:
+        self.handle = services.scene.add_transform_controls(
+            "/path/handle", scale=HANDLE_SCALE, line_width=2.0, depth_test=False, visible=False
+        )
+        self._followed = self.handle.update_timestamp
+        follow_drags(services, self.handle, "stop", self._follow)
+
+    def updates(self, placed: Placed) -> Updates:
+        """Yield the updates that keep the gizmo at the chosen pose."""
+        state, pose = placed.frame.state, stops.chosen_pose(placed.frame.state)
+        yield self.handle, "visible", pose is not None and state.view.handle
+        # Put back, the gizmo would lose a movement that the list is yet to follow.
+        if pose is None or self.handle.update_timestamp != self._followed:
+            return
+        with contextlib.suppress(InputError):
+            # A pose that was written back during a drag would move the gizmo under the pointer.
+            if self._pose(state) == pose:
+                return
+        there = position_of(state.design, pose, state.view.at)
+        yield self.handle, "position", tuple((placed.scale * np.array(there)).tolist())
+        yield self.handle, "wxyz", pose.quaternion
+
+    def _pose(self, state: State) -> Pose:
+        x, y, z = (np.asarray(self.handle.position) / scene_scale(state)).tolist()
+        w, i, j, k = np.asarray(self.handle.wxyz, dtype=np.float64).tolist()
+        return state.pose_at((x, y, z), Pose(state.pose.position, (w, i, j, k)))
+
+    def _follow(self, state: State) -> Action:
+        self._followed = self.handle.update_timestamp
+        dragged = stops.set_stop(state, "dragged", at=self._pose(state))
+        return dragged or stops.ChooseStop(None)

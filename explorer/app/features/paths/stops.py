@@ -1,0 +1,200 @@
+"""The poses of the next path as a list, and the actions that change it.
+
+The first pose follows the platform until another is added to the list; a list of one pose goes on
+to the mode beyond δ1 = 0. Assembly modes are those of the present leg lengths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from explorer.app.features.paths.state import MOST_STOPS, Paths, Stop, StopAt, journey_of
+from explorer.app.state.actions import Action
+from explorer.app.state.parts import with_value
+from explorer.app.state.state import Joints, State, joints_of
+from explorer.errors import InputError
+from explorer.export.pose_tables import parse_table, read_corners
+from explorer.mechanism.kinematics import forward
+from explorer.mechanism.pose import Pose
+
+# Leg lengths that differ by less, over the reach, are the same.
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class SetStops(Action):
+    """Set the poses of the next path, and which of them is edited."""
+
+    stops: tuple[Stop, ...]
+    chosen: int | None
+    text: str
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        paths = replace(Paths.of(state), stops=self.stops, chosen=self.chosen, problem=None)
+        return with_value(state, "paths", paths)
+
+    def words(self) -> str:
+        """Return the words for the action."""
+        return self.text
+
+
+@dataclass(frozen=True)
+class SetStop(SetStops):
+    """Set one pose of the next path; all numbers that are set of it are one step."""
+
+    repeats: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class ChooseStop(Action):
+    """Choose the pose of the list that is edited; None for none."""
+
+    continues: ClassVar[bool] = True
+
+    chosen: int | None
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return with_value(state, "paths.chosen", self.chosen)
+
+
+def stops_of(state: State) -> tuple[Stop, ...]:
+    """Return the poses of the next path; after a single one the mode beyond δ1 = 0."""
+    stops = Paths.of(state).stops
+    return stops if len(stops) > 1 else (*stops, Stop(state.mode ^ 4))
+
+
+def chosen_of(state: State) -> int | None:
+    """Return the index of the pose that is edited; None if none is."""
+    chosen = Paths.of(state).chosen
+    return chosen if chosen is not None and 0 <= chosen < len(stops_of(state)) else None
+
+
+def chosen_pose(state: State) -> Pose | None:
+    """Return the pose that is edited, if it is a fixed one."""
+    chosen = chosen_of(state)
+    at = None if chosen is None else stops_of(state)[chosen].at
+    return at if isinstance(at, Pose) else None
+
+
+def poses_of(state: State) -> tuple[Pose, ...]:
+    """Return the poses between which the next path leads; errors are those of `pose_of`."""
+    return tuple(pose_of(state, stop.at) for stop in stops_of(state))
+
+
+def pose_of(state: State, at: StopAt) -> Pose:
+    """Return the pose of a stop: itself, a mode of the present leg lengths, or the present pose.
+
+    Raises:
+        InputError: The present leg lengths do not close in other modes, to rounding.
+    """
+    if at is None:
+        return state.pose
+    if isinstance(at, Pose):
+        return at
+    solution = forward(state.design, _legs(state))
+    if not solution.feasible:
+        raise InputError(
+            "the present leg lengths lie at the edge of what closes, where all modes are one; "
+            "move the platform away from the singular pose"
+        )
+    return Pose.of(solution.position[at], solution.rotation[at])
+
+
+def _legs(state: State) -> Joints:
+    """Return the leg lengths whose modes are poses of a path.
+
+    During a straight path between modes of equal leg lengths, they are those lengths.
+    """
+    journey = journey_of(state)
+    if journey is not None and journey.kind == "straight" and journey.pose == state.pose:
+        joints = [joints_of(state.design, pose) for pose in journey.poses]
+        if np.ptp(joints, axis=0).max() <= SAME * state.design.reach:
+            return joints[0]
+    return joints_of(state.design, state.pose)
+
+
+def pinned_stops(state: State) -> tuple[Stop, ...]:
+    """Return the poses of the list, with the present one as numbers."""
+    stops = Paths.of(state).stops
+    return tuple(replace(s, at=state.pose) if s.at is None else s for s in stops)
+
+
+def add_present(state: State) -> SetStops:
+    """Return the action that adds the present pose after the edited one, or as the last."""
+    stops, chosen = pinned_stops(state), chosen_of(state)
+    if Paths.of(state).stops == (Stop(),):
+        return SetStops(stops, None, "Pose 1 of the path: present pose")
+    at = len(stops) if chosen is None else min(chosen + 1, len(stops))
+    # None is edited, so that the handle in the scene is that of the platform.
+    return replace(_insert(stops, at, Stop(state.pose), "present pose"), chosen=None)
+
+
+def copy_stop(state: State, index: int) -> SetStops:
+    """Return the action that adds a pose of the list as numbers behind it, to be changed."""
+    at = stops_of(state)[index].at
+    stops = pinned_stops(state) if index < len(Paths.of(state).stops) else stops_of(state)
+    return _insert(stops, index + 1, Stop(pose_of(state, at)), f"as pose {index + 1}")
+
+
+def close_path(state: State) -> SetStops | None:
+    """Return the action that ends the path in its first pose; None for a single pose."""
+    stops = pinned_stops(state)
+    if len(stops) < 2 or stops[-1].at == stops[0].at:
+        return None
+    return _insert(stops, len(stops), Stop(stops[0].at), "as pose 1")
+
+
+def _insert(stops: tuple[Stop, ...], at: int, stop: Stop, words: str) -> SetStops:
+    return SetStops((*stops[:at], stop, *stops[at:]), at, f"Pose {at + 1} of the path: {words}")
+
+
+def remove_stop(state: State, index: int) -> SetStops:
+    """Return the action that removes a pose; without one the path starts in the present pose."""
+    stops = Paths.of(state).stops
+    rest = (*stops[:index], *stops[index + 1 :]) or (Stop(),)
+    return SetStops(rest, None, f"Pose {index + 1} removed from the path")
+
+
+def lift_stop(state: State, index: int) -> SetStops | None:
+    """Return the action that moves a pose one place towards the start; None for the first."""
+    stops = pinned_stops(state)
+    if not 0 < index < len(stops):
+        return None
+    swapped = (*stops[: index - 1], stops[index], stops[index - 1], *stops[index + 1 :])
+    return SetStops(swapped, index - 1, f"Pose {index + 1} of the path before pose {index}")
+
+
+def set_stop(state: State, text: str, **changes: object) -> SetStop | None:
+    """Return the action that changes the edited pose or its pause; None if none is edited."""
+    chosen = chosen_of(state)
+    if chosen is None:
+        return None
+    stops = [*stops_of(state)]
+    stops[chosen] = replace(stops[chosen], **changes)  # pyright: ignore[reportArgumentType]
+    return SetStop(tuple(stops), chosen, f"Pose {chosen + 1} of the path: {text}")
+
+
+def stops_in_table(state: State, data: bytes, name: str) -> SetStops:
+    """Return the action that takes the poses and pauses of a table; it is one of corners.
+
+    Positions are those of the tool where the table has columns of it.
+
+    Raises:
+        InputError: The table has none, or too many.
+    """
+    table = parse_table(Path(name).name, data, state.design.unit_mm)
+    at = "tool" if "tool_x" in table.columns else "b4"
+    if len(table.rows) > MOST_STOPS:
+        raise InputError(
+            f"{name} has {len(table.rows)} poses, and a path on the page at most {MOST_STOPS}: "
+            "explorer drives takes longer ones"
+        )
+    poses, pauses = read_corners(table, state.design, state.pose.rotation, at)
+    stops = tuple(map(Stop, poses, pauses))
+    return SetStops(stops, None, f"Path of {len(stops)} poses from {name}")
