@@ -576,7 +576,7 @@ def test_chosen_pose_has_the_only_handle_and_is_dragged_by_it(services: Services
     handle, state = StopHandle(services), open_state(OPTIMAL, TILTED)
     platform = DragHandle(services)
 
-    def visible(state: State) -> list[bool]:
+    def visible(state: State) -> list[object]:
         placed = Placed(Frame(state))
         found = [*handle.updates(placed), *platform.updates(placed)]
         return [value for _, name, value in found if name == "visible"]

@@ -35,8 +35,7 @@ from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.editor import TYPED, numbers_of
 from explorer.app.features.paths.feature import PathScene
 from explorer.app.features.paths.panel import PathsPanel
-from explorer.app.features.paths.state import Stop, journey_of
-from explorer.app.features.paths.stops import chosen_pose
+from explorer.app.features.paths.state import Paths, Stop, journey_of
 from explorer.app.features.sharing.scene_files import caption_of
 from explorer.app.features.singularity.feature import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
@@ -298,7 +297,7 @@ def test_typed_pose_of_a_path_is_where_the_tool_is(services: Services, desk: Des
         return controls_of(services, panel, desk.state)
 
     def typed() -> State:
-        pose = chosen_pose(desk.state)
+        pose = Paths.of(desk.state).edited_pose
         assert pose is not None
         return replace(desk.state, pose=pose)
 

@@ -160,6 +160,7 @@ def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.Monk
     assert {"0", "200", "400", "flat"} <= {*words}
     assert 0.0 < float(newcomer.field("Time (s)").input_value()) < 600.0
     assert newcomer.presses_for() == 6
+    monkeypatch.undo()
     newcomer.press("Home pose")
     expect(newcomer.field("roll (°)")).to_have_value("0")
     newcomer.press("Pose 2")

@@ -70,6 +70,11 @@ class FeaturePart:
         """Why the design cannot be changed now, as a clause; "" if it can."""
         return ""
 
+    @property
+    def edited_pose(self) -> Pose | None:
+        """The pose that has the handle in the scene in place of the platform; None if none has."""
+        return None
+
     def on_open(self) -> Self:
         """Return the part for another design."""
         return self

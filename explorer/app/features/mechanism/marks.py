@@ -7,7 +7,6 @@ import contextlib
 import numpy as np
 
 from explorer.app.features.feature import Services, follow_drags
-from explorer.app.features.paths.stops import chosen_pose
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
 from explorer.app.state.moves import SetPose
@@ -95,4 +94,5 @@ class DragHandle(ScenePart):
 def _is_handle_visible(placed: Placed) -> bool:
     # Apart, the platform is not where the handle would move it; a pose of a path has its own.
     state = placed.frame.state
-    return state.view.handle and not placed.is_apart and chosen_pose(state) is None
+    is_elsewhere = any(part.edited_pose is not None for part in state.parts.values())
+    return state.view.handle and not placed.is_apart and not is_elsewhere

@@ -71,7 +71,7 @@ class StopsEditor:
                 ),
                 step=step,
                 power=1 - index,
-                visible=lambda state: stops.chosen_pose(state) is not None,
+                visible=lambda state: Paths.of(state).edited_pose is not None,
             )
         controls.number(
             "Pause (s)",
@@ -202,7 +202,7 @@ def numbers_of(state: State, at: StopAt) -> str:
 
 def typed_numbers(state: State) -> tuple[Triple, Triple]:
     """Return position, of b4 or of the tool point, and angles of the chosen pose, or zeros."""
-    pose = stops.chosen_pose(state)
+    pose = Paths.of(state).edited_pose
     if pose is None:
         return ZERO, ZERO
     there = position_of(state.design, pose, state.view.at)
@@ -213,7 +213,7 @@ def typed_numbers(state: State) -> tuple[Triple, Triple]:
 
 def _set_typed(state: State, index: int, triple: Triple) -> Action | None:
     """Set the position of the chosen pose, or with index 1 its angles."""
-    pose, there = stops.chosen_pose(state), triple
+    pose, there = Paths.of(state).edited_pose, triple
     if pose is None:
         return None
     if index:
@@ -265,7 +265,7 @@ class StopHandle(ScenePart):
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that keep the gizmo at the chosen pose."""
-        state, pose = placed.frame.state, stops.chosen_pose(placed.frame.state)
+        state, pose = placed.frame.state, Paths.of(placed.frame.state).edited_pose
         yield self.handle, "visible", pose is not None and state.view.handle
         # Put back, the gizmo would lose a movement that the list is yet to follow.
         if pose is None or self.handle.update_timestamp != self._followed:

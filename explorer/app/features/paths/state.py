@@ -172,7 +172,7 @@ class Paths(FeaturePart, name="paths"):
 
     Raises:
         InputError: A time for planning or for the path that is not above zero, no pose or too many,
-            or one after the first that follows the present one.
+            one after the first that follows the present one, or an index below zero.
     """
 
     stops: tuple[Stop, ...] = field(default=(Stop(),), metadata=LENGTHS)
@@ -199,8 +199,16 @@ class Paths(FeaturePart, name="paths"):
                 f"a path on the page has 1 to {MOST_STOPS} poses; got {len(self.stops)}: "
                 "explorer drives takes longer ones"
             )
+        if self.chosen is not None and self.chosen < 0:
+            raise InputError(f"poses of a path have numbers from 0; got {self.chosen}")
         if None in [stop.at for stop in self.stops[1:]]:
             raise InputError("only the first pose of a path can be the present one")
+
+    @property
+    def edited_pose(self) -> Pose | None:
+        """The pose of the list that is edited, if it is a fixed one."""
+        edited = self.stops[self.chosen : self.chosen + 1] if self.chosen is not None else ()
+        return next((stop.at for stop in edited if isinstance(stop.at, Pose)), None)
 
     def on_open(self) -> Self:
         """Return the part for another design: the settings of the next path."""

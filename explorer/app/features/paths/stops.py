@@ -72,14 +72,7 @@ def stops_of(state: State) -> tuple[Stop, ...]:
 def chosen_of(state: State) -> int | None:
     """Return the index of the pose that is edited; None if none is."""
     chosen = Paths.of(state).chosen
-    return chosen if chosen is not None and 0 <= chosen < len(stops_of(state)) else None
-
-
-def chosen_pose(state: State) -> Pose | None:
-    """Return the pose that is edited, if it is a fixed one."""
-    chosen = chosen_of(state)
-    at = None if chosen is None else stops_of(state)[chosen].at
-    return at if isinstance(at, Pose) else None
+    return chosen if chosen is not None and chosen < len(stops_of(state)) else None
 
 
 def poses_of(state: State) -> tuple[Pose, ...]:
