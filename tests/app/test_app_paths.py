@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import csv
 import io
 import os
@@ -12,6 +13,7 @@ from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -31,7 +33,7 @@ from explorer.app.features.paths.actions import (
     SetPathTime,
     TakePlan,
 )
-from explorer.app.features.paths.editor import MODES, PRESENT, TYPED, StopHandle, numbers_of
+from explorer.app.features.paths.editor import MODES, PRESENT, TYPED, numbers_of
 from explorer.app.features.paths.feature import DIED, PathRunner, PathScene, path_chip
 from explorer.app.features.paths.panel import (
     CANCEL,
@@ -572,20 +574,33 @@ def test_poses_and_pauses_are_taken_from_a_table() -> None:
             stops_in_table(state, data, "pick.csv")
 
 
-def test_chosen_pose_has_the_only_handle_and_is_dragged_by_it(services: Services) -> None:
-    handle, state = StopHandle(services), open_state(OPTIMAL, TILTED)
-    platform = DragHandle(services)
+def test_chosen_pose_has_the_handle_and_is_dragged_by_it(services: Services, desk: Desk) -> None:
+    handle = DragHandle(services)
+    gizmo: Any = handle.handle
 
-    def visible(state: State) -> list[object]:
-        placed = Placed(Frame(state))
-        found = [*handle.updates(placed), *platform.updates(placed)]
-        return [value for _, name, value in found if name == "visible"]
+    def place() -> list[float]:
+        updates: Any = handle.updates(Placed(Frame(desk.state)))
+        (position,) = [list(value) for _, name, value in updates if name == "position"]
+        return position
 
-    state = with_value(state, "paths.stops", (Stop(TILTED), Stop(GOAL)))
-    assert visible(state) == [False, True]
-    state = chosen(state, 1)
-    assert visible(state) == [True, False]
-    assert visible(Go().apply(state)) == [False, True]
+    desk.session.do(Set("paths.stops", (Stop(TILTED), Stop(GOAL))))
+    scale = Placed(Frame(desk.state)).scale
+    assert place() == pytest.approx(scale * np.array(desk.state.pose.position))
+    desk.session.do(Set("paths.chosen", 1))
+    assert place() == pytest.approx(scale * np.array(GOAL.position))
+    before = desk.state.pose
+    gizmo.position, gizmo.wxyz = tuple(scale * np.array((9.0, 4.0, 8.0))), TILTED.quaternion
+    gizmo._impl_aux.last_updated = time.time() + 1.0
+    for callback in gizmo._impl_aux.update_cb:
+        asyncio.run(callback(SimpleNamespace(client_id=1)))
+    assert stops_of(desk.state)[0].at == TILTED
+    dragged = poses_of(desk.state)[1]
+    assert dragged.position == pytest.approx((9.0, 4.0, 8.0))
+    assert dragged.quaternion == TILTED.quaternion
+    assert desk.state.pose == before
+    # Once the path is made, the handle is that of the platform again.
+    desk.session.do(Go())
+    assert place() == pytest.approx(scale * np.array(TILTED.position))
 
 
 def test_pauses_of_a_planned_path_are_at_its_poses(services: Services) -> None:

@@ -71,9 +71,9 @@ class FeaturePart:
         return ""
 
     @property
-    def edited_pose(self) -> Pose | None:
-        """The pose that has the handle in the scene in place of the platform; None if none has."""
-        return None
+    def handled(self) -> str:
+        """Path in this part of the pose that the handle in the scene moves; "" for the platform."""
+        return ""
 
     def on_open(self) -> Self:
         """Return the part for another design."""

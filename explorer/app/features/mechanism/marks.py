@@ -9,9 +9,12 @@ import numpy as np
 from explorer.app.features.feature import Services, follow_drags
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.moves import SetPose
+from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.errors import InputError
+from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Updates
@@ -46,7 +49,10 @@ class Labels(ScenePart):
 
 
 class DragHandle(ScenePart):
-    """The gizmo at b4 or at the tool point: arrows move the platform, arcs turn it about it."""
+    """The gizmo at b4 or at the tool point: arrows move the platform, arcs turn it about it.
+
+    It moves another pose instead while a feature has one to be edited.
+    """
 
     def __init__(self, services: Services) -> None:
         self.handle = services.scene.add_transform_controls(
@@ -57,7 +63,7 @@ class DragHandle(ScenePart):
         follow_drags(services, self.handle, "drag", self._follow)
 
     def pose(self, state: State) -> Pose:
-        """Return the pose of the platform where the gizmo is.
+        """Return the pose where the gizmo is.
 
         Raises:
             InputError: The gizmo is where no platform can be.
@@ -67,18 +73,20 @@ class DragHandle(ScenePart):
         return state.pose_at((x, y, z), Pose(state.pose.position, (w, i, j, k)))
 
     def updates(self, placed: Placed) -> Updates:
-        """Yield the updates that keep the gizmo on the platform."""
+        """Yield the updates that keep the gizmo on the platform, or at what is edited."""
         state = placed.frame.state
+        pose = value_at(state, handled_pose(state))
         yield self.handle, "visible", _is_handle_visible(placed)
         # Put back, the gizmo would lose a movement that the platform is yet to follow.
         if self.handle.update_timestamp != self._followed:
             return
         with contextlib.suppress(InputError):
             # A pose that was written back during a drag would move the gizmo under the pointer.
-            if self.pose(state) == state.pose:
+            if self.pose(state) == pose:
                 return
-        yield self.handle, "position", tuple(placed.point.tolist())
-        yield self.handle, "wxyz", state.pose.quaternion
+        there = np.array(position_of(state.design, pose, state.view.at))
+        yield self.handle, "position", tuple((placed.scale * there).tolist())
+        yield self.handle, "wxyz", pose.quaternion
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the tips of the three arrows."""
@@ -86,13 +94,19 @@ class DragHandle(ScenePart):
             return NO_POINTS
         return placed.point + ARROW_LENGTH * placed.frame.snapshot.rotation.T
 
-    def _follow(self, state: State) -> SetPose:
+    def _follow(self, state: State) -> Action:
         self._followed = self.handle.update_timestamp
-        return SetPose(self.pose(state))
+        path, pose = handled_pose(state), self.pose(state)
+        return SetPose(pose) if path == "pose" else Set(path, pose, "Pose of the path", "dragged")
+
+
+def handled_pose(state: State) -> str:
+    """Return the path in the state of the pose that the gizmo moves."""
+    parts = state.parts.items()
+    edited = (f"{name}.{part.handled}" for name, part in parts if part.handled)
+    return next(edited, "pose")
 
 
 def _is_handle_visible(placed: Placed) -> bool:
-    # Apart, the platform is not where the handle would move it; a pose of a path has its own.
-    state = placed.frame.state
-    is_elsewhere = any(part.edited_pose is not None for part in state.parts.values())
-    return state.view.handle and not placed.is_apart and not is_elsewhere
+    # Apart, the platform is not where the handle would move it.
+    return placed.frame.state.view.handle and not placed.is_apart

@@ -1,20 +1,17 @@
-"""The list of the poses of a path with its buttons, the fields of one, and its handle."""
+"""The list of the poses of a path with its buttons, and the fields of one."""
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 from html import escape
 
-import numpy as np
 import viser
 
-from explorer.app.features.feature import Services, follow_drags, show_html
+from explorer.app.features.feature import Services, show_html
 from explorer.app.features.paths import stops
 from explorer.app.features.paths.state import Paths, Stop, StopAt
 from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
-from explorer.app.scene.placing import Placed, ScenePart, scene_scale
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of
@@ -39,8 +36,6 @@ OPTIONS = (PRESENT, *MODES, TYPED)
 # Decimals of typed angles and coordinates.
 DECIMALS = 9
 ZERO: Triple = (0.0, 0.0, 0.0)
-# Size of the handle in the scene, smaller than that of the platform.
-HANDLE_SCALE = 1.3
 
 
 class StopsEditor:
@@ -167,23 +162,23 @@ def _row(state: State, index: int, stop: Stop, *, is_chosen: bool, is_own: bool)
             sign,
             hint=words,
             label=words,
-            class_name="ex-link",
+            class_name="ex-link ex-act",
             is_disabled=not is_there,
         )
-    what = "present pose" if stop.at is None else f"mode {stop.at}"
+    what = "present" if stop.at is None else f"mode {stop.at}"
     name = "" if isinstance(stop.at, Pose) else f"{what}: "
-    pause = f" · {format_number(stop.pause)} s" if stop.pause else ""
+    pause = f"{format_number(stop.pause)} s at " if stop.pause else ""
     words = press_button(
         "paths.choose",
         index,
-        f"{number}. {name}{numbers_of(state, stop.at)}{pause}",
+        f"{number}. {pause}{name}{numbers_of(state, stop.at)}",
         hint="Change this pose",
         label=f"Pose {number}",
         class_name="ex-fill ex-cut",
         is_on=is_chosen,
     )
     look = "ex-row is-here" if is_chosen else "ex-row" if is_own else "ex-row ex-dim"
-    return f'<div class="{look}">{words}<span class="ex-ends">{acts}</span></div>'
+    return f'<div class="{look}">{words}<span class="ex-whole">{acts}</span></div>'
 
 
 def numbers_of(state: State, at: StopAt) -> str:
@@ -251,39 +246,3 @@ def _choose(state: State, option: str) -> Action | None:
         # It is of use once the platform has moved away.
         at = state.pose
     return stops.set_stop(state, option, at=at)
-
-
-class StopHandle(ScenePart):
-    """The gizmo at the chosen pose of the list: arrows move the pose, arcs turn it."""
-
-    def __init__(self, services: Services) -> None:
-        self.handle = services.scene.add_transform_controls(
-            "/path/handle", scale=HANDLE_SCALE, line_width=2.0, depth_test=False, visible=False
-        )
-        self._followed = self.handle.update_timestamp
-        follow_drags(services, self.handle, "stop", self._follow)
-
-    def updates(self, placed: Placed) -> Updates:
-        """Yield the updates that keep the gizmo at the chosen pose."""
-        state, pose = placed.frame.state, Paths.of(placed.frame.state).edited_pose
-        yield self.handle, "visible", pose is not None and state.view.handle
-        # Put back, the gizmo would lose a movement that the list is yet to follow.
-        if pose is None or self.handle.update_timestamp != self._followed:
-            return
-        with contextlib.suppress(InputError):
-            # A pose that was written back during a drag would move the gizmo under the pointer.
-            if self._pose(state) == pose:
-                return
-        there = position_of(state.design, pose, state.view.at)
-        yield self.handle, "position", tuple((placed.scale * np.array(there)).tolist())
-        yield self.handle, "wxyz", pose.quaternion
-
-    def _pose(self, state: State) -> Pose:
-        x, y, z = (np.asarray(self.handle.position) / scene_scale(state)).tolist()
-        w, i, j, k = np.asarray(self.handle.wxyz, dtype=np.float64).tolist()
-        return state.pose_at((x, y, z), Pose(state.pose.position, (w, i, j, k)))
-
-    def _follow(self, state: State) -> Action:
-        self._followed = self.handle.update_timestamp
-        dragged = stops.set_stop(state, "dragged", at=self._pose(state))
-        return dragged or stops.ChooseStop(None)

@@ -9,7 +9,6 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, Tab, show
 from explorer.app.features.paths.actions import AdvanceJourney, Play, TakePlan, plan
-from explorer.app.features.paths.editor import StopHandle
 from explorer.app.features.paths.panel import PathsPanel, slow_words
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
 from explorer.app.features.paths.stops import stops_of
@@ -167,7 +166,7 @@ PATHS = Feature(
         "Singular once": "The path goes through a singular pose, where the platform is not held.",
         "No path": "No path was found that keeps what was asked for.",
     },
-    scene=(PathScene, StopHandle),
+    scene=(PathScene,),
     later_feeds=(DRIVES_FEED,),
     runners=(PathRunner,),
     commands=(

@@ -210,6 +210,11 @@ class Paths(FeaturePart, name="paths"):
         edited = self.stops[self.chosen : self.chosen + 1] if self.chosen is not None else ()
         return next((stop.at for stop in edited if isinstance(stop.at, Pose)), None)
 
+    @property
+    def handled(self) -> str:
+        """Path of the pose that is edited, if it is a fixed one, which has the handle."""
+        return "" if self.edited_pose is None else f"stops.{self.chosen}.at"
+
     def on_open(self) -> Self:
         """Return the part for another design: the settings of the next path."""
         return replace(self, planning=None, problem=None, journey=None)
