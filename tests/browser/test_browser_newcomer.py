@@ -16,6 +16,7 @@ from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.app.features.paths.state import journey_of
+from explorer.app.features.paths.stops import stops_of
 from explorer.app.features.prototype.work import export_simulation
 from explorer.app.features.requirement.state import Required
 from explorer.app.scene.placing import Placed
@@ -200,6 +201,26 @@ def test_pick_and_place_with_a_lift_is_played_and_exported_as_it_is_timed_in_20_
     journey = journey_of(data_tab.state)
     assert journey is not None
     assert (journey.at, journey.is_playing) == (pytest.approx(0.5), False)
+
+
+def test_poses_of_a_path_are_taken_from_a_file(
+    newcomer: Newcomer, data_tab: Tab, tmp_path: Path
+) -> None:
+    table = tmp_path / "pick.csv"
+    newcomer.open("Paths")
+    for lines, words in (
+        (("x_mm,y_mm,pause_s", "100,50,0"), "pick.csv has no column z"),
+        (("x_mm,y_mm,z_mm,pause_s", "100,50,90,0.2", "100,50,110,0"), ""),
+    ):
+        table.write_text("\n".join(lines), encoding="utf-8")
+        with newcomer.page.expect_file_chooser() as chooser:
+            newcomer.press("Poses from a file …")
+        chooser.value.set_files(table)
+        newcomer.wait()
+        if words:
+            expect(newcomer.notices(words)).to_have_count(1)
+    newcomer.sees(re.compile(r"^2\. 100\.0, 50\.0, 110\.0"))
+    assert [stop.pause for stop in stops_of(data_tab.state)] == [0.2, 0.0]
 
 
 def test_prototype_is_shown_and_exported(newcomer: Newcomer, data_tab: Tab) -> None:

@@ -1,16 +1,17 @@
-// Opens files: those that the button of the dialog Designs chooses, and those dropped anywhere on
-// the page. viser's own upload would report success before the server has read the file.
+// Sends files: those that buttons choose, and to the button of the dialog Designs those dropped
+// anywhere on the page. viser's own upload would report success before the server has read the file.
 window.explorer.files ??= (() => {
   // Most bytes of a file that are sent, with which the server refuses what is too large; bytes of a
   // part.
   const MOST = 32e6,
     PART = 2 ** 19;
   const root = document.documentElement;
-  let button = null,
+  const buttons = new Set();
+  let ofDrops = null,
     waiting = [],
     isSending = false,
     count = 0;
-  const send = async (file) => {
+  const send = async ([file, button]) => {
     // A folder cannot be read.
     const buffer = await file
       .slice(0, MOST)
@@ -42,14 +43,15 @@ window.explorer.files ??= (() => {
     isSending = Boolean(file);
     if (file) send(file);
   };
-  const open = (files) => {
-    waiting.push(...files);
+  const open = (files, button) => {
+    for (const file of files) waiting.push([file, button]);
     if (!isSending) window.explorer.sendFile();
   };
   window.explorer.capture("change", (event) => {
-    if (event.target.id !== `file_upload_${button}`) return;
+    const [, button] = /^file_upload_(.*)/.exec(event.target.id) ?? [];
+    if (!buttons.has(button)) return;
     event.stopPropagation();
-    open(event.target.files);
+    open(event.target.files, button);
   });
   const hasFiles = ({ dataTransfer }) => dataTransfer?.types.includes("Files");
   addEventListener("dragover", (event) => {
@@ -65,11 +67,12 @@ window.explorer.files ??= (() => {
     if (!hasFiles(event)) return;
     event.preventDefault();
     delete root.dataset.drop;
-    open(event.dataTransfer.files);
+    open(event.dataTransfer.files, ofDrops);
   });
-  // Called with the id of the button on each connection; no file waits from one to the next.
-  return (uuid) => {
-    button = uuid;
+  // Called with the id of each button on each connection; no file waits from one to the next.
+  return (uuid, takesDrops) => {
+    buttons.add(uuid);
+    if (takesDrops) ofDrops = uuid;
     waiting = [];
     isSending = false;
   };

@@ -273,7 +273,7 @@ class DesignsPanel:
             hint="A design, a study or a session (JSON), or what was measured of a machine (CSV), "
             "from this computer; or drop it anywhere on the page.",
         )
-        run_script(services.server, read_script("files", element_id(upload)))
+        run_script(services.server, read_script("files", element_id(upload), True))
 
         @upload.on_upload
         def _(event: viser.GuiEvent[viser.GuiUploadButtonHandle]) -> None:

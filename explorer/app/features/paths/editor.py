@@ -28,6 +28,8 @@ from explorer.numerics.number_text import (
     format_number,
     snap_to_decimals,
 )
+from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
+from explorer.page.look import call_script, read_script
 from explorer.page.widgets.assigning import Updates
 
 PRESENT, TYPED = "Present pose", "Typed numbers"
@@ -128,10 +130,14 @@ class StopsEditor:
             "has the pauses.",
         )
 
+        run_script(services.server, read_script("files", element_id(upload), False))
+
         @upload.on_upload
         def _(event: viser.GuiEvent[viser.GuiUploadButtonHandle]) -> None:
             data, name = upload.value.content, upload.value.name
             session.do(lambda state: stops.stops_in_table(state, data, name), who=event.client_id)
+            if event.client is not None:
+                run_script_in(event.client, call_script("sendFile"))
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the list show the frame."""
@@ -190,9 +196,13 @@ def numbers_of(state: State, at: StopAt) -> str:
     there = position_of(state.design, pose, state.view.at)
     unit, size = state.unit, state.unit.convert(state.design.reach)
     position = ", ".join(format_fitted(unit.convert(x), size, 4) for x in there)
-    angles = ", ".join(f"{format_decimals(angle, 1)}°" for angle in angles_of(pose))
+    angles = ", ".join(f"{_degrees(angle)}°" for angle in angles_of(pose))
     hint = f"x, y, z of {state.point} in {unit.name}; yaw, pitch, roll"
     return f'<span title="{hint}">{position} · {angles}</span>'
+
+
+def _degrees(angle: float) -> str:
+    return format_decimals(angle, 1).removesuffix(".0")
 
 
 def typed_numbers(state: State) -> tuple[Triple, Triple]:
