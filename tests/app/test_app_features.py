@@ -34,6 +34,7 @@ from explorer.app.features.orientation.work import TILTS_FEED, GoToTilt, SetTilt
 from explorer.app.features.paths.actions import AdvanceJourney, SetLaw, SetPathTime, TakePlan
 from explorer.app.features.paths.stops import ChooseStop, SetStop
 from explorer.app.features.requirement.state import OpenFound
+from explorer.app.features.sharing.links import OpenLink
 from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
@@ -261,7 +262,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
     SetFold, SetVariable, SetName, SetPathTime, SetLaw, SetStop, ChooseStop, PickDesign, OpenFound,
-    OpenSession,
+    OpenLink, OpenSession,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map, a handle or a file gives."""
 

@@ -16,8 +16,14 @@ from numpy.testing import assert_allclose
 from playwright.sync_api import Browser, Page, expect
 
 from explorer import PRESETS, Design, forward, from_folds, inverse, margins, to_folds
+from explorer.app.features.sharing.links import encode_link
+from explorer.app.state.state import open_state
+from explorer.app.state.view import View
+from explorer.export.controller import limit_rows, pair_rows
 from explorer.export.moving_page import NAMES, moving_page
 from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import Limits
+from explorer.mechanism.feasible_intervals import possible_ranges
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.valid_poses import COLLISIONS, violations
@@ -180,6 +186,50 @@ def test_moving_page_moves_by_fields_sliders_modes_and_keys(page: Page, tmp_path
     before = page.evaluate("window.page.state.folds[3]")
     page.keyboard.press("ArrowLeft")
     assert page.evaluate("window.page.state.folds[3]") < before
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_moving_page_opens_the_design_and_the_pose_of_a_link(
+    page: Page, tmp_path: Path, seed: int
+) -> None:
+    design = limited_design(seed)
+    if seed > 1:
+        limits = Limits(margin=(None, 0.0)[seed - 2], carriage_order="any", gap=1 / 3)
+        design = msgspec.structs.replace(design, limits=limits, home=None, b3=0.0)
+    pose = design.home_pose.turn(np.zeros(3), np.array([0.1, 0.2, 0.3]))
+    view = View(coordinates="lengths", flags=False, leaves=True)
+    (tmp_path / "page.html").write_bytes(moving_page(OPTIMAL))
+    fragment = encode_link(open_state(design, pose, view))
+    page.goto(f"{(tmp_path / 'page.html').as_uri()}#{fragment}")
+    expect(page.locator("h1")).to_have_text(design.name)
+    expect(page).to_have_title(f"{design.name} – flagged 4-4 manipulator")
+    shown = [page.locator(f"#show-{name}").is_checked() for name in ("bodies", "flags", "folds")]
+    assert shown == [True, False, True]
+    expect(page.locator("#tabs :checked")).to_have_value("joints")
+    position, rotation = state_of(page)
+    assert_allclose(position, design.unit_mm * np.array(pose.position), rtol=SHARE)
+    assert_allclose(rotation, pose.rotation, rtol=0, atol=SHARE)
+    # The words and the ranges of Python.
+    words = [*limit_rows(design)[2], *pair_rows(design)[1]]
+    found = page.locator("#limits td:nth-child(2)").all_text_contents()
+    assert found == [each for each in words if each]
+    joints = np.array(possible_ranges(design).joints) * design.unit_mm
+    extra = 0.1 * np.array([[-1.0, 1.0]]) * np.ptp(joints, axis=1, keepdims=True)
+    spans = page.evaluate(
+        "[...document.querySelectorAll('#sliders [type=range]')].map(e => [+e.min, +e.max])"
+    )
+    now = inverse(in_mm(design), position, rotation)[:, None]
+    wanted = np.clip(joints + extra, [-np.inf, -np.inf], now * [1, 0] + [0, np.inf])
+    wanted[:, 1] = np.maximum(wanted[:, 1], now[:, 0])
+    assert_allclose(spans, wanted, rtol=1e-9, atol=1e-9)
+
+    # A damaged link is refused in words, and the page has its own design.
+    page.goto("about:blank")
+    page.goto(f"{(tmp_path / 'page.html').as_uri()}#{fragment[:-9]}{fragment[-8:]}")
+    expect(page.locator("#message")).to_contain_text("The link is damaged")
+    expect(page.locator("h1")).to_have_text(OPTIMAL.name)
+    page.evaluate("location.hash = 'buildable'")
+    expect(page.locator("h1")).to_have_text("buildable")
 
 
 def state_of(page: Page) -> tuple[FloatArray, FloatArray]:

@@ -1,5 +1,5 @@
 // The page: its state is one pose; sliders, modes and keys move it, and all that is shown follows.
-window.startPage = (design) => {
+window.startPage = (design, link) => {
   const mechanism = window.flagged44(design);
   const { along, dot, column, inverse, margins, forward, fromFolds, toFolds } = mechanism;
   const find = (id) => document.getElementById(id);
@@ -576,9 +576,18 @@ window.startPage = (design) => {
     ? `1 square = ${square} mm`
     : "This browser has no WebGL 2, so the scene shows labels alone; the numbers hold.";
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => request());
-  say();
-  buildSliders();
-  take(design.home);
+  find("name").textContent = design.name;
+  document.title = `${design.name} – flagged 4-4 manipulator`;
+  // What the explorer shows of the mechanism is shown here too, if there is the like.
+  const view = link.view ?? {};
+  const tab = { lengths: "joints", folds: "folds" }[view.coordinates] ?? "pose";
+  find("tabs").querySelector(`[value=${tab}]`).checked = true;
+  openTab(tab);
+  setShown("bodies", view.bodies !== false || view.legs !== false);
+  setShown("flags", view.flags !== false);
+  if (view.leaves) setShown("folds", true);
+  if (view.tetrahedra && !view.tetrahedra.some(Boolean)) setShown("margins", false);
+  take(link.pose ? design.poseOf(link.pose) : design.home);
   let framed = false;
   new ResizeObserver(() => {
     if (!framed) fit();

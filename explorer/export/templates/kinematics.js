@@ -208,8 +208,7 @@ window.flagged44 = (design) => {
     const limits = [];
     quantities(pose).forEach((value, index) => {
       const { low, high } = design.limits[index];
-      const [least, most] = [low ?? -Infinity, high ?? Infinity];
-      if (!(least <= value && value <= most)) limits.push({ index, value, above: value > most });
+      if (!(low <= value && value <= high)) limits.push({ index, value, above: value > high });
     });
     const ends = legs(pose);
     const collisions = pairs.filter(([i, j], k) => {

@@ -28,7 +28,7 @@ VISER_PAGE = Path(viser.__file__).parent / "client/build/index.html"
 # Paths of the page of the explorer, of that of viser, and what viser calls its own.
 PATHS, VISER_PATH, ITS_PATH = ("/", "/index.html"), "/viser.html", "/index.html"
 # Scripts that run before those of viser, in their order.
-SCRIPTS = ("socket", "graphics")
+SCRIPTS = ("socket", "graphics", "links")
 
 
 class ClientPage:

@@ -15,6 +15,7 @@ from explorer.app.features.optimise.state import Optimisation
 from explorer.app.features.paths.work import request_for
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.features.sharing import scene_files
+from explorer.app.features.sharing.links import OpenLink, decode_link, encode_link
 from explorer.app.features.sharing.reporting import ReportFormat, make_report
 from explorer.app.scene.camera import has_perspective
 from explorer.app.scene.placing import scene_scale
@@ -22,7 +23,8 @@ from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import extra_button, open_button, press_button
 from explorer.app.widgets.downloads import File
-from explorer.app.widgets.markup import box
+from explorer.app.widgets.markup import box, sentence
+from explorer.errors import InputError
 from explorer.export.controller import kernel_files
 from explorer.export.drawings.figure import COLUMN, PAGE, figure_svg
 from explorer.export.drawings.mechanism import Projection
@@ -31,9 +33,14 @@ from explorer.export.moving_page import moving_page
 from explorer.files.extras import is_missing
 from explorer.files.writing import zip_bytes
 from explorer.mechanism.design import Design
+from explorer.page.browser.viser_gaps import run_script_in
+from explorer.page.look import call_script, read_script
 from explorer.page.widgets.assigning import Update
 
 PRESS = "export"
+# Names of presses that copy the link to the state, and that open one.
+COPY, OPEN_LINK = "link.copy", "link.open"
+LINK_HINT = "It opens this design, requirement, pose and view in any explorer or moving page."
 PICTURES = {
     "PNG 1920 × 1080": ((1920, 1080), False),
     "PNG 3840 × 2160": ((3840, 2160), False),
@@ -179,17 +186,49 @@ def _row(export: FileExport, is_ready: bool) -> str:
     )
 
 
-def export_button(_: Frame) -> str:
-    """Return the button of the bar that opens the dialog, as HTML."""
-    hint = "Download the workspace, the mechanism, pictures, reports and more."
-    return open_button("Export", "Export", hint=hint, class_name="ex-tool ex-outlined")
+class ShareButtons:
+    """The buttons of the bar that copy a link to the state, and that open the dialog.
+
+    A script of the page sends the fragment of its address, which is opened.
+    """
+
+    def __init__(self, services: Services) -> None:
+        self._services, buttons, server = services, services.buttons, services.server
+        buttons.on(COPY, lambda _, client: self._copy(client))
+        buttons.on(OPEN_LINK, self._open)
+        buttons.offer("Export › Copy link", LINK_HINT, COPY)
+        server.on_client_connect(
+            lambda client: run_script_in(client, call_script("openLink", OPEN_LINK))
+        )
+
+    def __call__(self, _: Frame) -> str:
+        """Return the buttons as HTML."""
+        hint = "Download the workspace, the mechanism, pictures, reports and more."
+        look = "ex-tool ex-outlined"
+        copies = press_button(COPY, "", "Copy link", hint=LINK_HINT, class_name=look)
+        return copies + open_button("Export", "Export", hint=hint, class_name=look)
+
+    def _copy(self, client: viser.ClientHandle) -> None:
+        try:
+            fragment = encode_link(self._services.session.latest_state())
+        except InputError as error:
+            self._services.complain(sentence(str(error)), client.client_id)
+            return
+        run_script_in(client, read_script("copies") + call_script("copyLink", fragment))
+        client.add_notification("The link is copied", LINK_HINT, auto_close_seconds=6.0)
+
+    def _open(self, fragment: str, client: viser.ClientHandle) -> None:
+        try:
+            self._services.session.do(OpenLink(decode_link(fragment)), who=client.client_id)
+        except InputError as error:
+            self._services.complain(sentence(str(error)), client.client_id)
 
 
 SHARING = Feature(
     "sharing",
     manual="cad.md",
     tabs=(Tab("dialog", "Export", ExportDialog),),
-    bar=(InBar("right", lambda _: export_button),),
+    bar=(InBar("right", ShareButtons),),
     exports=(
         FileExport(
             "Report",
