@@ -21,9 +21,10 @@ from playwright.sync_api import Browser, Download, Locator, Page, expect
 from tab import Tab
 
 import explorer
+from explorer.app.features.sharing.links import Link, encode_link
 from explorer.app.scene.placing import scene_scale
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
-from explorer.app.state.actions import Set
+from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import View
 from explorer.export.controller import kernel_files
@@ -102,6 +103,35 @@ def test_picture_has_the_size_and_background_that_are_asked_for_and_no_handle(ta
     found = likeness(shown[height // 4 :], blocks(taken, 2)[height // 4 :])
     assert found.spot < PLAIN_TO_SEE
     assert found.structure < 0.05
+
+
+def test_link_is_copied_and_opened_and_a_damaged_one_is_refused(tab: Tab) -> None:
+    tab.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    session = tab.running.page.session
+    tab.type("z", "77.7")
+    session.do(Set("view.leaves", True))
+    tab.settle()
+    wanted, address = Link.of(tab.state), tab.page.url.partition("?")[0]
+    tab.page.get_by_role("button", name="Copy link").click()
+
+    def copied() -> str:
+        return str(tab.page.evaluate("navigator.clipboard.readText()"))
+
+    tab.wait_for(lambda: copied() == f"{address}#{encode_link(tab.state)}", "the link")
+    fragment = copied().partition("#")[2]
+    # In a page that is open, and in one that opens.
+    for opens in ("location.hash = it", "history.replaceState(null, '', `#${it}`)"):
+        session.do(Open(explorer.PRESETS["buildable"]))
+        tab.settle()
+        tab.page.evaluate(f"it => {{ {opens} }}", fragment)
+        if "replaceState" in opens:
+            tab.reload()
+        tab.wait_for(lambda: Link.of(tab.state) == wanted, "the state of the link")
+        assert "#" not in tab.page.url
+    tab.page.evaluate("it => { location.hash = it }", fragment[:-1])
+    expect(tab.page.get_by_text("The link is damaged")).to_be_visible()
+    assert Link.of(tab.state) == wanted
+    tab.close_notices()
 
 
 def test_moving_page_kernel_and_configuration_are_those_of_the_design(tab: Tab) -> None:
