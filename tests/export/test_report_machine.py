@@ -18,6 +18,8 @@ from explorer.app.features.sharing.reporting import make_report
 from explorer.export.pose_tables import parse_table, read_poses
 from explorer.export.report.data import ReportData
 from explorer.export.report.workspace import worst_payload_force
+from explorer.find.check import check_requirement
+from explorer.find.requirement import Requirement
 from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.mechanism.design import JOINTS
@@ -241,3 +243,30 @@ def test_report_of_a_path_has_its_drives_and_the_corners_that_give_them_again() 
     far = TimedPath((home, Pose((10.0, 40.0, 8.0), home.quaternion)), 0.5)
     refused = section_of(read(make_report(OPTIMAL, path=far).decode()), "Drives").text
     assert "leaves the limits" in refused
+
+
+def test_report_begins_with_the_requirement_and_its_check() -> None:
+    design = explorer.PRESETS["buildable"]
+    needed = Requirement(name="mine", box_mm=(200.0, 150.0, 100.0), tilt_deg=15.0, hull_mm=100.0)
+    page = read(make_report(design, requirement=needed).decode())
+    section = section_of(page, "Requirement")
+    assert next(page.all("h2")).text == "Requirement"
+    assert "mine: a box of 200 × 150 × 100 mm" in section.text
+    check, rows = check_requirement(design, needed), table_of(section, "The check of the design")
+    assert [*rows] == [each.words for each in check.demands]
+    for each in check.demands:
+        expected = [each.worst, each.limit, each.spare] if each.worst or each.limit else []
+        assert rows[each.words].values == expected
+        assert rows[each.words].text.endswith("missed") == (not each.kept)
+    assert f"{len(check.missed)} of {len(check.demands)} demands are missed" in section.text
+    assert check.missed
+    assert "Requirement" not in titles(read(make_report(design).decode()))
+
+
+def test_report_writes_rounding_errors_as_zero() -> None:
+    tiny = Pose.of_yaw_pitch_roll((1e-16, 5.0, 9.0), (-60.0, 1.27e-14, 3e-15))
+    tool = Tool((1.0, 2.0, 1e-16), tiny.quaternion)
+    page = page_of(msgspec.structs.replace(OPTIMAL, tool=tool), tiny)
+    tables = " ".join(each.text for each in page.all("table"))
+    assert "10⁻¹⁴" not in tables
+    assert "10⁻¹⁶" not in tables

@@ -17,6 +17,7 @@ from explorer.cli.options import JsonOptions, PoseOptions, load
 from explorer.cli.output import attributes
 from explorer.errors import InputError
 from explorer.files.writing import check_writable, write_whole
+from explorer.find.requirement import load_requirement
 from explorer.optimise.outcome import load_record
 
 FORMATS: dict[str, Literal["html", "pdf"]] = {".html": "html", ".htm": "html", ".pdf": "pdf"}
@@ -86,6 +87,9 @@ class ReportCommand(JsonOptions, PoseOptions):
     record: Annotated[Path | None, values.FILE] = None
     """Record of the search that found the design, written by `explorer optimise`."""
 
+    requirement: Annotated[Path | None, values.FILE] = None
+    """Requirement file (JSON) that the design is checked against."""
+
     def run(self) -> None:
         """Write the report and its path."""
         start = time.monotonic()
@@ -98,7 +102,8 @@ class ReportCommand(JsonOptions, PoseOptions):
         record = None if self.record is None else load_record(self.record)
         from explorer.app.features.sharing.reporting import make_report
 
-        data = make_report(design, pose, record=record, file_format=file_format)
+        needed = None if self.requirement is None else load_requirement(self.requirement)
+        data = make_report(design, pose, record, file_format, requirement=needed)
         write_whole(self.out, data)
         facts = {"format": file_format, "bytes": len(data), "seconds": time.monotonic() - start}
         self.write(lambda: {"out": self.out, **facts}, [str(self.out)])

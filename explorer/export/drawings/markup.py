@@ -113,9 +113,12 @@ def page_picture(
     return as_html(element("svg", *pieces, class_=look, **named, **attributes))
 
 
-def number(value: float, digits: int = 6) -> Element:
-    """Return an element with a rounded number, whose `value` is the number in full."""
-    return figure(format_number(value, digits), value)
+def number(value: float, digits: int = 6, *, size: float = 0.0) -> Element:
+    """Return an element with a rounded number, whose `value` is the number in full.
+
+    A rounding error of numbers of a size is written as 0.
+    """
+    return figure(format_number(value, digits, size=size), value)
 
 
 def figure(text: str, value: float) -> Element:

@@ -13,6 +13,9 @@ from typing import TypeVar
 import numpy as np
 
 from explorer.errors import ExplorerError, NoAnswerError
+from explorer.find.answers import RequirementCheck
+from explorer.find.check import check_requirement
+from explorer.find.requirement import Requirement
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.measures.snapshot import Snapshot, evaluate
@@ -45,11 +48,13 @@ def compute(function: Callable[[], T]) -> T | ExplorerError:
 class ReportData(Case):
     """The data of a report: a design in a pose and its workspace at that orientation.
 
-    The record is of the search that found the design, the path one with speeds and forces.
+    The record is of the search that found the design, the path one with speeds and forces, the
+    requirement what the design is checked against.
     """
 
     record: Record | None = None
     path: TimedPath | None = None
+    requirement: Requirement | None = None
 
     @property
     def is_home(self) -> bool:
@@ -122,6 +127,12 @@ class ReportData(Case):
         if not np.isfinite(worst).all():
             return weighed
         return ToolPrecision(weighed.loaded.with_load((*triple(worst), 0.0, 0.0, 0.0)))
+
+    @property
+    def check(self) -> RequirementCheck | ExplorerError | None:
+        """Check of the design against the requirement; None without one."""
+        needed = self.requirement
+        return needed and compute(lambda: check_requirement(self.design, needed))
 
     @cached_property
     def bill(self) -> Bill | ExplorerError:

@@ -232,6 +232,7 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
 
 
 _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
+    mechanism.requirement_section,
     mechanism.mechanism_section,
     workspace.workspace_section,
     mechanism.singularity_section,

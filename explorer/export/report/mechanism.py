@@ -45,6 +45,41 @@ _JOINTS = {
 }
 
 
+def requirement_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the requirement and its check; nothing without a requirement."""
+    needed, check = data.requirement, data.check
+    if needed is None or check is None:
+        return
+    yield element("h2", "Requirement")
+    edges, load = " × ".join(map(format_number, needed.box_mm)), needed.payload
+    what = f"{needed.name}: a box of {edges} mm for the tool, with home at its centre"
+    what += f", at every tilt up to {format_number(needed.tilt_deg)}°" if needed.tilt_deg else ""
+    what += f", with {format_number(load.mass_kg)} kg" if load.mass_kg else ""
+    what += f" and a force of {format_number(load.force_n)} N at the tool" if load.force_n else ""
+    yield markup.paragraph(f"{what}.")
+    if isinstance(check, ExplorerError):
+        yield markup.paragraph(f"It cannot be checked: {check}.", class_="note")
+        return
+    missed, count = len(check.missed), len(check.demands)
+    verdict_words = f"{missed} of {count} demands are missed" if missed else "All demands are kept"
+    yield markup.paragraph(element("b", f"{verdict_words}."), class_="note" if missed else None)
+    rows = [
+        (
+            each.words,
+            *(
+                (number(value, 4), each.unit if each.unit == "°" else f" {each.unit}")
+                if each.worst or each.limit
+                else ""
+                for value in (each.worst, each.limit, each.spare)
+            ),
+            "missed" if not each.kept else "proven" if each.proven else each.remark or "kept",
+        )
+        for each in check.demands
+    ]
+    heads = ("demand", "worst value", "limit", "spare", "over the box and every tilt")
+    yield markup.table(heads, rows, "<>>><", "The check of the design")
+
+
 def mechanism_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on the mechanism."""
     yield element("h2", "Mechanism")
@@ -76,7 +111,8 @@ def mechanism_section(data: ReportData) -> Iterator[Element]:
 
 def _lengths(data: ReportData, name: Cell, value: float) -> Row:
     """Return a row with a length in design units and in millimetres."""
-    return name, value, value * data.design.unit_mm
+    unit, reach = data.design.unit_mm, data.design.reach
+    return name, number(value, size=reach), number(unit * value, size=unit * reach)
 
 
 def point_rows(data: ReportData, name: str, point: Triple) -> Iterator[Row]:
@@ -89,14 +125,14 @@ def angle_rows(rotation: FloatArray, of: str = "") -> Iterator[Row]:
     """Yield the rows of yaw, pitch and roll of a rotation (3, 3), and the words that follow."""
     angles = yaw_pitch_roll_from_rotation(rotation).tolist()
     for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True):
-        yield f"{name}{of}", (number(angle), "°"), ""
+        yield f"{name}{of}", (number(angle, size=180.0), "°"), ""
 
 
 def _pose(data: ReportData) -> Element:
     pose = data.snapshot.pose
     rows = [*point_rows(data, "b4", pose.position), *angle_rows(data.rotation)]
     turn = zip("wxyz", pose.quaternion, strict=True)
-    rows += [(f"quaternion {name}", value, "") for name, value in turn]
+    rows += [(f"quaternion {name}", number(value, size=1.0), "") for name, value in turn]
     return markup.table(("", "units", "mm"), rows, "<>>", "Home pose" if data.is_home else "Pose")
 
 

@@ -14,6 +14,7 @@ from explorer.app.features.feature import Feature, FileExport, InBar, Services, 
 from explorer.app.features.optimise.state import Optimisation
 from explorer.app.features.paths.work import request_for
 from explorer.app.features.prototype.building import BuildVerdict
+from explorer.app.features.requirement.state import Required
 from explorer.app.features.sharing import scene_files
 from explorer.app.features.sharing.links import OpenLink, decode_link, encode_link
 from explorer.app.features.sharing.reporting import ReportFormat, make_report
@@ -110,13 +111,13 @@ def send_scene(services: Services, who: Who) -> None:
 def send_report(services: Services, file_format: ReportFormat, who: Who) -> None:
     """Send the report of the design in its present pose."""
     state = services.session.latest_state()
-    asked = request_for(state)
+    asked, needed = request_for(state), Required.of(state).requirement
     path = asked and asked[1]
     services.downloads.compute(
         who,
         f"{state.design.name}-report.{file_format}",
         make_report,
-        (state.design, state.pose, Optimisation.of(state).record, file_format, path),
+        (state.design, state.pose, Optimisation.of(state).record, file_format, path, needed),
         ("Writing the report", "This takes some seconds."),
     )
 

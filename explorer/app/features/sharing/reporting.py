@@ -9,6 +9,7 @@ import datetime as dt
 from concurrent.futures import ThreadPoolExecutor
 from typing import Literal
 
+from explorer.find.requirement import Requirement
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 from explorer.optimise.outcome import Record
@@ -23,6 +24,7 @@ def make_report(
     record: Record | None = None,
     file_format: ReportFormat = "html",
     path: TimedPath | None = None,
+    requirement: Requirement | None = None,
     *,
     date: dt.date | None = None,
 ) -> bytes:
@@ -34,6 +36,7 @@ def make_report(
         record: Record of the search that gave the design, which adds its history.
         file_format: HTML, or PDF by a headless browser.
         path: Path whose speeds and forces are told.
+        requirement: Requirement that the design is checked against.
         date: Date of the report; today if None.
 
     Raises:
@@ -44,7 +47,8 @@ def make_report(
     from explorer.export.report.document import report_html
 
     html = report_html(
-        ReportData(design, pose=pose, record=record, path=path), date or dt.date.today()
+        ReportData(design, pose=pose, record=record, path=path, requirement=requirement),
+        date or dt.date.today(),
     )
     if file_format == "html":
         return html.encode()
