@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from functools import cache
 
 import msgspec
@@ -270,3 +271,25 @@ def test_report_writes_rounding_errors_as_zero() -> None:
     tables = " ".join(each.text for each in page.all("table"))
     assert "10⁻¹⁴" not in tables
     assert "10⁻¹⁶" not in tables
+
+
+def test_report_in_millimetres_has_the_lengths_of_the_other_and_no_unit_of_its_own() -> None:
+    design = design_with(payload=PAYLOAD, actuators=ERRORS, struts=BENDS)
+    # A unit that is no power of ten, so that no number is right by chance.
+    design = msgspec.structs.replace(design, unit_mm=7.3)
+    other, page = (
+        read(make_report(design, POSE, in_mm=in_mm, date=dt.date(2026, 3, 9)).decode())
+        for in_mm in (False, True)
+    )
+    assert re.findall(r"1 unit|units", page.text) == ["1 unit"]
+    assert page.one(id="design").text == other.one(id="design").text
+    assert page.one(id="commands").text == other.one(id="commands").text
+    for section, caption, column in (
+        ("Mechanism", "Design variables X", 1),
+        ("Mechanism", f"Joints in {ReportData(design, pose=POSE).pose_words}, and their limits", 1),
+        ("Workspace", "Volumes", 1),
+    ):
+        rows = table_of(section_of(other, section), caption)
+        for name, row in table_of(section_of(page, section), caption).items():
+            wanted = rows[name].values[column]
+            assert row.values[0] == pytest.approx(wanted, rel=1e-9), name

@@ -7,6 +7,7 @@ markup. Looks are classes of `drawing.css`, and of the report's `style.css`.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 from unicodedata import category
@@ -26,6 +27,9 @@ PRECISE = 4
 Piece: TypeAlias = "Element | str | float | None"
 Cell: TypeAlias = "Piece | Sequence[Piece]"
 Row: TypeAlias = tuple[Cell, ...]
+
+# The design unit in the words of a report.
+_UNITS = re.compile(r"\b(?:design )?units(?![a-z])|(?<=per )unit\b")
 
 
 def element(tag: str, *pieces: Piece, **attributes: str | float | None) -> Element:
@@ -174,6 +178,27 @@ def table(
         element("thead", row_of("th", heads)) if heads else None,
         element("tbody", *(row_of("td", row) for row in rows)),
     )
+
+
+def name_millimetres(root: Element) -> None:
+    """Name the design unit, which is 1 mm, by its name; leave out columns that say the same again.
+
+    Design files and commands stay as they are.
+    """
+    for found in root.iter("table"):
+        heads = [head.text or "" for head in found.iterfind("thead/tr/th")]
+        for index in reversed(range(len(heads))):
+            others = {_UNITS.sub(name, heads[index]) for name in ("mm", "cm")} - {heads[index]}
+            same = next((other for other in others if other in heads), None)
+            for row in found.iter("tr") if same else ():
+                cell, other = row[index], row[heads.index(same or "")]
+                # What has no length stands in the first of both columns.
+                is_empty = not len(other) and not other.text
+                row.remove(other if is_empty else cell)
+    for each in root.iter():
+        if each.tag != "pre":
+            each.text = each.text and _UNITS.sub("mm", each.text)
+        each.tail = each.tail and _UNITS.sub("mm", each.tail)
 
 
 def paragraph(*pieces: Piece, class_: str | None = None) -> Element:

@@ -327,7 +327,9 @@ def _cross(first: FloatArray, second: FloatArray) -> bool:
 def scale_bar(view: Projection, unit_mm: float, x: float, y: float) -> Element:
     """Return a scale bar of a round length, labelled in design units and millimetres."""
     length = round_length(130.0 / view.scale)
-    words = f"{format_number(length, 6)} units = {format_number(length * unit_mm, 6)} mm"
+    words = f"{format_number(length * unit_mm, 6)} mm"
+    if unit_mm != 1.0:
+        words = f"{format_number(length, 6)} units = {words}"
     return bar(x, y, length * view.scale, words)
 
 

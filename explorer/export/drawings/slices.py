@@ -266,7 +266,7 @@ def legend(slices: Slices, unit_mm: float) -> Element:
     """Return the legend of the colours of maps, of the smallest margin or of another measure."""
     bands, step, left, pieces = slices.bands, 46.0, 130.0, list[Element]()
     colours, levels = bands.colours, bands.levels
-    title, rows = "smallest margin", [("units", 1.0), ("mm", unit_mm)]
+    title, rows = "smallest margin", [("units", 1.0)] * (unit_mm != 1.0) + [("mm", unit_mm)]
     words = MEASURE_WORDS.get(bands.measure)
     if words is not None:
         title, rows = words[0], [words[1:]]

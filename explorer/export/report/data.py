@@ -6,10 +6,11 @@ A value that cannot be computed does not stop the report: the reason stands in i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
+import msgspec
 import numpy as np
 
 from explorer.errors import ExplorerError, NoAnswerError
@@ -19,6 +20,7 @@ from explorer.find.requirement import Requirement
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.measures.snapshot import Snapshot, evaluate
+from explorer.mechanism.design import Limits
 from explorer.mechanism.machine import Payload, Tool
 from explorer.motion.masses import DENSITY
 from explorer.numerics.arrays import triple
@@ -49,12 +51,44 @@ class ReportData(Case):
     """The data of a report: a design in a pose and its workspace at that orientation.
 
     The record is of the search that found the design, the path one with speeds and forces, the
-    requirement what the design is checked against.
+    requirement what the design is checked against. Where lengths are in millimetres, `filed` is the
+    same in the unit of the design's file.
     """
 
     record: Record | None = None
     path: TimedPath | None = None
     requirement: Requirement | None = None
+    filed: ReportData | None = None
+
+    @property
+    def as_filed(self) -> ReportData:
+        """The data in the unit of the design's file."""
+        return self.filed or self
+
+    def in_millimetres(self) -> ReportData:
+        """Return the data of the same design in a design unit of 1 mm."""
+        design, unit = self.design, self.design.unit_mm
+
+        def scale(value: Any) -> Any:
+            if isinstance(value, tuple):
+                return tuple(map(scale, cast("tuple[Any, ...]", value)))
+            return unit * value if isinstance(value, float) else value
+
+        def scaled(whole: Any, *names: str) -> Any:
+            lengths = {name: scale(getattr(whole, name)) for name in names}
+            return msgspec.structs.replace(whole, **lengths)
+
+        limits = (name for name in Limits.__struct_fields__ if name != "swing")
+        lengths = scaled(design, "a3", "b1", "b2", "b3", "node_step", "required_box")
+        changed = msgspec.structs.replace(
+            lengths,
+            unit_mm=1.0,
+            limits=scaled(design.limits, *limits),
+            home=scaled(design.home_pose, "position"),
+            tool=scaled(design.tool, "position"),
+            payload=scaled(design.payload, "centre"),
+        )
+        return replace(self, design=changed, pose=scaled(self.at, "position"), filed=self)
 
     @property
     def is_home(self) -> bool:

@@ -52,6 +52,9 @@ def report_html(data: ReportData, date: dt.date) -> str:
     )
     body = element("body", element("header", *_title_block(data, date), class_="cover"))
     for section in _SECTIONS:
+        # The search, and what gives the report again, are in the unit of the design's file.
+        if data.filed and section is search_section:
+            markup.name_millimetres(body)
         pieces = list(section(data))
         if pieces:
             body.append(element("section", *pieces))
@@ -66,7 +69,7 @@ def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
     particulars = (
         ("Date", element("time", date.isoformat(), datetime=date.isoformat())),
         ("Made by", f"Flagged 4-4 explorer {__version__}"),
-        ("Unit", f"1 unit = {format_number(data.design.unit_mm, 6)} mm"),
+        ("Unit", f"1 unit = {format_number(data.as_filed.design.unit_mm, 6)} mm"),
         ("Design file, SHA-256", element("span", f"{code[:16]}…", title=code)),
     )
     yield element("dl", *(_entry(*each) for each in particulars), class_="particulars")
@@ -76,7 +79,7 @@ def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
 
 
 def _hash(data: ReportData) -> str:
-    return sha256(encode_design(data.design)).hexdigest()
+    return sha256(encode_design(data.as_filed.design)).hexdigest()
 
 
 def _entry(name: Piece, *pieces: Piece) -> Element:
@@ -90,11 +93,14 @@ def _headline(data: ReportData) -> Iterator[tuple[Piece, ...]]:
         title = f"{measure.heading[:1].upper()}{measure.heading[1:]}"
         if value is None:
             yield title, "infinite" if name in data.measurements.infinite else "–"
-        elif name == "node_volume" and not isinstance(data.node_count, ExplorerError):
+            continue
+        unit = measure.unit_in(data.design.millimetres if data.filed else UNITS, value)
+        figure = markup.number(unit.convert(value))
+        if name == "node_volume" and not isinstance(data.node_count, ExplorerError):
             count = element("span", whole(data.node_count.count), " nodes")
-            yield title, value, _unit("units³, "), count
+            yield title, figure, _unit(f"{unit.name}, "), count
         else:
-            yield title, value, _unit(measure.unit_in(UNITS).name)
+            yield title, figure, _unit(unit.name)
     yield "Reach", markup.number(reach, 4), _unit("mm")
     yield "Smallest margin |δ| here", markup.number(snapshot.proximity * reach, 4), _unit("mm")
     condition = markup.number(float(snapshot.inverse_condition), 4)
@@ -109,7 +115,7 @@ def _unit(words: str) -> Element:
 
 def search_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on the search that found the design; nothing without a record."""
-    record = data.record
+    record, data = data.record, data.as_filed
     if record is None:
         return
     yield element("h2", "Optimisation")
@@ -183,7 +189,8 @@ def _title(record: Record, curve: Curve) -> str:
 
 def _reproduction(data: ReportData) -> Iterator[Element]:
     yield element("h2", "How to reproduce it")
-    name, record = commands.name_of(data.design), data.record
+    filed, record = data.as_filed.design, data.record
+    name = commands.name_of(filed)
     where: tuple[Piece, ...] = ("The design is a preset of the explorer. ",)
     if name == commands.DESIGN_FILE:
         where = ("Save the file below as ", element("code", name), ". ")
@@ -206,11 +213,11 @@ def _reproduction(data: ReportData) -> Iterator[Element]:
     yield markup.table(("", *columns), rows, "<" * (1 + len(columns)))
     yield element("h3", "Design file")
     yield paragraph("SHA-256 ", element("code", _hash(data), id="design-hash"), class_="dim")
-    yield element("pre", encode_design(data.design).decode(), id="design")
+    yield element("pre", encode_design(filed).decode(), id="design")
 
 
 def _commands(data: ReportData, source: str) -> Iterator[str]:
-    design, pose = data.design, data.snapshot.pose
+    design, pose = data.as_filed.design, data.as_filed.at
     turned = "" if data.is_home else f" --quaternion {' '.join(map(repr, pose.quaternion))}"
     legs = " --interference" if isinstance(data.accessible, AccessibleWorkspace) else ""
     record = "" if data.record is None else " --record record.json"
@@ -222,7 +229,7 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     if data.has("is_loaded") or data.has("is_limited"):
         yield commands.load_command("forces", LoadedPose(design, pose))
     if data.precision is not None:
-        yield commands.load_command("accuracy", data.precision.loaded)
+        yield commands.load_command("accuracy", (data.as_filed.precision or data.precision).loaded)
     if data.carrying_part is not None:
         yield f"explorer workspace --design {source}{turned} --load 0 0 0"
     if not isinstance(data.bill, ExplorerError):

@@ -289,7 +289,7 @@ def path_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on what a path asks of the actuators; nothing without a path."""
     if data.path is None:
         return
-    design, path = data.design, data.path
+    design, path = data.as_filed.design, data.path
     found = compute(lambda: drives_along(design, path))
     yield element("h2", "Drives")
     if isinstance(found, ExplorerError):

@@ -112,12 +112,13 @@ def send_report(services: Services, file_format: ReportFormat, who: Who) -> None
     """Send the report of the design in its present pose."""
     state = services.session.latest_state()
     asked, needed = request_for(state), Required.of(state).requirement
-    path = asked and asked[1]
+    path, record = asked and asked[1], Optimisation.of(state).record
+    told = state.design, state.pose, record, file_format, path, needed
     services.downloads.compute(
         who,
         f"{state.design.name}-report.{file_format}",
         make_report,
-        (state.design, state.pose, Optimisation.of(state).record, file_format, path, needed),
+        (*told, state.view.lengths == "mm"),
         ("Writing the report", "This takes some seconds."),
     )
 

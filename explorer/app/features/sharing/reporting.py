@@ -25,6 +25,7 @@ def make_report(
     file_format: ReportFormat = "html",
     path: TimedPath | None = None,
     requirement: Requirement | None = None,
+    in_mm: bool = False,
     *,
     date: dt.date | None = None,
 ) -> bytes:
@@ -37,6 +38,7 @@ def make_report(
         file_format: HTML, or PDF by a headless browser.
         path: Path whose speeds and forces are told.
         requirement: Requirement that the design is checked against.
+        in_mm: Whether lengths are in millimetres alone, rather than in design units too.
         date: Date of the report; today if None.
 
     Raises:
@@ -46,10 +48,8 @@ def make_report(
     from explorer.export.report.data import ReportData
     from explorer.export.report.document import report_html
 
-    html = report_html(
-        ReportData(design, pose=pose, record=record, path=path, requirement=requirement),
-        date or dt.date.today(),
-    )
+    data = ReportData(design, pose=pose, record=record, path=path, requirement=requirement)
+    html = report_html(data.in_millimetres() if in_mm else data, date or dt.date.today())
     if file_format == "html":
         return html.encode()
     # Playwright refuses calls on a thread with an event loop, such as a notebook's.
