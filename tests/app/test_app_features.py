@@ -341,6 +341,19 @@ def test_every_action_is_a_command_or_takes_a_value(running: Running, palette: P
     assert commands & others == set(), "a command after all"
 
 
+def test_switch_that_is_used_again_before_it_is_drawn_is_back(
+    running: Running, palette: Palette
+) -> None:
+    session = running.page.session
+    (switch,) = (each for each in palette.commands if each.keys == (Key("G"),))
+    before = session.state.view.grid
+    for times in (2, 3):
+        for _ in range(times):
+            switch.run(CLIENT)
+        assert session.wait_until_idle()
+        assert (session.state.view.grid == before) == (times == 2)
+
+
 def test_saved_design_is_opened_by_a_command_of_its_name(running: Running) -> None:
     session, saved = running.page.session, running.page.services.get(SavedDesigns)
 

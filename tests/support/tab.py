@@ -373,7 +373,9 @@ class Tab:
         """
         deadline = time.monotonic() + PATIENCE_SECONDS
         while not condition():
-            assert time.monotonic() < deadline, f"never came about: {what}"
+            if time.monotonic() > deadline:
+                focused = self.page.evaluate("document.activeElement.outerHTML.slice(0, 300)")
+                raise AssertionError(f"never came about: {what}; the focus is on {focused}")
             self.page.wait_for_timeout(20)
 
     def wait_until_shown(self, words: str, value: float, tolerance: float = 1e-9) -> None:

@@ -66,6 +66,14 @@ class Control(Generic[Value]):
         """Set another value, as a command of a client does."""
         self.session.post(self, lambda state: self.bound.write(state, value), who=client.client_id)
 
+    def toggle(self, client: viser.ClientHandle) -> None:
+        """Set the other one of two values, as a command of a client does."""
+        # What the handle shows may be older than the state.
+        self.session.do(
+            lambda state: self.bound.write(state, not self.bound.read(Frame(state))),
+            who=client.client_id,
+        )
+
     def _change(self, state: State) -> Action | None:
         self._last_value = self.handle.value
         self._is_set_here = True

@@ -186,9 +186,7 @@ class Controls:
         """Add a checkbox, and its command, which may have keys."""
         handle = self._gui.add_checkbox(label, initial_value=False, hint=hint)
         control = self._bind(handle, bound_to(at, label), **conditions)
-        self._commands.offer(
-            handle, lambda client: control.use(not handle.value, client), keys=keys
-        )
+        self._commands.offer(handle, control.toggle, keys=keys)
 
     def dropdown(
         self,
