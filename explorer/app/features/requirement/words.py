@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import lru_cache
 from html import escape
@@ -121,12 +122,13 @@ def checklist(check: RequirementCheck | None, problem: str, look: str) -> str:
 def _demand_row(demand: DemandCheck) -> str:
     unit = demand.unit if demand.unit in ("", "°") else f" {demand.unit}"
     worst, limit, short = (
-        format_number(value, 3) for value in (demand.worst, demand.limit, -demand.spare)
+        format_number(value, 3, infinite="∞")
+        for value in (demand.worst, demand.limit, -demand.spare)
     )
     signs = "≥≤" if demand.kept else "><"
     sign = signs[demand.worst <= demand.limit]
     values = f"{worst} {sign} {limit}{unit}" if demand.limit or demand.worst else ""
-    missed = f"by {short}{unit}" if demand.spare else "no"
+    missed = f"by {short}{unit}" if demand.spare and math.isfinite(demand.spare) else "no"
     level, mark = ("within", "✓") if demand.kept else ("beyond", missed)
     name = escape(f"{demand.words[:1].upper()}{demand.words[1:]}")
     content = f'<span>{name}</span><span>{values}</span><span class="ex-{level}">{mark}</span>'
