@@ -360,9 +360,7 @@ def test_first_design_can_be_built_and_keeps_the_requirement_of_the_form() -> No
     assert "Requirement kept" in rows
     assert "is-beyond" not in rows
     # In a singular pose a force is infinite, and misses its limit by no number.
-    endless = dataclasses.replace(
-        check.demands[0], kept=False, worst=math.inf, limit=5.0, spare=-math.inf
-    )
+    endless = check.demands[0]._replace(kept=False, worst=math.inf, limit=5.0, spare=-math.inf)
     rows = words.checklist(dataclasses.replace(check, demands=(endless,)), "", "")
     assert "∞ &gt; 5" in rows or "∞ > 5" in rows
     assert ">no<" in rows
