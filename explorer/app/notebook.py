@@ -13,8 +13,8 @@ from html import escape
 from typing import Self
 
 from explorer.app.server import Running, start
-from explorer.app.state.actions import Action, Open
-from explorer.app.state.moves import SetPose
+from explorer.app.state.actions import Action, open_design
+from explorer.app.state.moves import set_pose
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
@@ -61,7 +61,7 @@ class Shown:
 
     @design.setter
     def design(self, design: Design | str) -> None:
-        self._do(Open(_as_design(design)))
+        self._do(open_design(_as_design(design)))
 
     @property
     def pose(self) -> Pose:
@@ -75,7 +75,7 @@ class Shown:
 
     @pose.setter
     def pose(self, pose: Pose) -> None:
-        self._do(SetPose(_as_pose(pose)))
+        self._do(set_pose(_as_pose(pose)))
 
     def stop(self) -> None:
         """Stop the server; the notebook shows the last picture until it is loaded again."""

@@ -11,15 +11,15 @@ import msgspec
 from hypothesis import strategies as st
 
 from explorer.app.features.calibration.feature import Calibrated
-from explorer.app.features.compare.feature import Pin, Unpin
+from explorer.app.features.compare.feature import pin, unpin
 from explorer.app.features.compare.state import CompareView
 from explorer.app.features.optimise.actions import (
-    Accept,
-    AddIterates,
-    CancelRun,
-    Compare,
-    EndRun,
-    StartRun,
+    accept,
+    add_iterates,
+    cancel_run,
+    compare,
+    end_run,
+    start_run,
 )
 from explorer.app.features.optimise.state import (
     Optimisation,
@@ -27,17 +27,24 @@ from explorer.app.features.optimise.state import (
     SearchResult,
     SearchRun,
 )
-from explorer.app.features.paths.actions import Go, Play, SetPathTime
+from explorer.app.features.paths.actions import go, play, set_path_time
 from explorer.app.features.paths.state import Stop
 from explorer.app.features.paths.stops import add_present
 from explorer.app.features.requirement.state import EXAMPLE, Required
-from explorer.app.features.studies.actions import BrushAxes
+from explorer.app.features.studies.actions import brush_axes
 from explorer.app.features.studies.state import Brush, Studies
 from explorer.app.session.history import UserAction
-from explorer.app.state.actions import Action, Open, Set
-from explorer.app.state.folds import SetFold
-from explorer.app.state.geometry import SetVariable
-from explorer.app.state.moves import GoHome, SetAngle, SetJoint, SetMode, SetPosition, UseNearest
+from explorer.app.state.actions import Action, Set, open_design
+from explorer.app.state.folds import set_fold
+from explorer.app.state.geometry import set_variable
+from explorer.app.state.moves import (
+    go_home,
+    set_angle,
+    set_joint,
+    set_mode,
+    set_position,
+    use_nearest,
+)
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView
@@ -138,7 +145,7 @@ def _end(state: State, count: int) -> Action:
     best = shown[-1] if shown else None
     record = None if run is None or best is None else _record(run, shown, best)
     verdict = SearchResult("stalled", "no step made it better", best, 2, 1, 0.1, record)
-    return EndRun(Optimisation.of(state).count, verdict, new)
+    return end_run(Optimisation.of(state).count, verdict, new)
 
 
 def _record(run: SearchRun, iterates: tuple[Iterate, ...], best: Iterate) -> Record:
@@ -166,21 +173,21 @@ def _record(run: SearchRun, iterates: tuple[Iterate, ...], best: Iterate) -> Rec
 
 
 MAKERS: tuple[Make, ...] = (
-    lambda state, i, share: SetJoint(i, _length(share)),
-    lambda state, i, share: SetPosition(i % 3, _length(share)),
-    lambda state, i, share: SetAngle(i % 3, 360.0 * share - 180.0),
-    lambda state, i, share: SetFold(i, 180.0 * share if i < 3 else 360.0 * share - 180.0),
-    lambda state, i, share: SetMode(i),
-    lambda state, i, share: SetVariable(VARIABLES[i], _length(share)),
+    lambda state, i, share: set_joint(i, _length(share)),
+    lambda state, i, share: set_position(i % 3, _length(share)),
+    lambda state, i, share: set_angle(i % 3, 360.0 * share - 180.0),
+    lambda state, i, share: set_fold(i, 180.0 * share if i < 3 else 360.0 * share - 180.0),
+    lambda state, i, share: set_mode(i),
+    lambda state, i, share: set_variable(VARIABLES[i], _length(share)),
     lambda state, i, share: Change("", {"hold": "pose" if share < 0.5 else "legs"}),
-    lambda state, i, share: UseNearest(),
-    lambda state, i, share: GoHome(),
-    lambda state, i, share: Open(list(PRESETS.values())[i % 2]),
+    lambda state, i, share: use_nearest(),
+    lambda state, i, share: go_home(),
+    lambda state, i, share: open_design(list(PRESETS.values())[i % 2]),
     _limited,
     _view,
-    lambda state, i, share: Go(),
-    lambda state, i, share: SetPathTime(8.0 * share),
-    lambda state, i, share: Play(on=i > 2),
+    lambda state, i, share: go(),
+    lambda state, i, share: set_path_time(8.0 * share),
+    lambda state, i, share: play(i > 2),
     lambda state, i, share: Change("paths", {"stops": (Stop((None, i, state.pose)[i % 3]),)}),
     lambda state, i, share: Change(
         "paths", {"stops": (Stop(), Stop((7 - i, state.pose)[i % 2], share))[: 1 + i % 2]}
@@ -197,16 +204,16 @@ MAKERS: tuple[Make, ...] = (
         },
     ),
     _request,
-    lambda state, i, share: StartRun(),
-    lambda state, i, share: AddIterates(Optimisation.of(state).count, iterates_of(state, i)),
-    lambda state, i, share: CancelRun(),
+    lambda state, i, share: start_run(),
+    lambda state, i, share: add_iterates(Optimisation.of(state).count, iterates_of(state, i)),
+    lambda state, i, share: cancel_run(),
     lambda state, i, share: _end(state, i),
-    lambda state, i, share: Compare(Optimisation.of(state).count, (MEASURED, MEASURED)),
-    lambda state, i, share: Accept(),
-    lambda state, i, share: Pin(state.design),
-    lambda state, i, share: Unpin(i % 3),
+    lambda state, i, share: compare(Optimisation.of(state).count, (MEASURED, MEASURED)),
+    lambda state, i, share: accept(),
+    lambda state, i, share: pin(state.design),
+    lambda state, i, share: unpin(i % 3),
     lambda state, i, share: Change("compared.look", {"overlay": share < 0.5}),
-    lambda state, i, share: BrushAxes((Brush("volume", ((share, 10.0),)),)),
+    lambda state, i, share: brush_axes((Brush("volume", ((share, 10.0),)),)),
 )
 
 
@@ -263,28 +270,28 @@ def rich_state() -> State:
     }
     actions: list[Action | Callable[[State], Action]] = [
         Change("optimisation.request", request),
-        SetVariable("b2", 2.7),
+        set_variable("b2", 2.7),
         Change("", {"view": varied(View()), "hold": "legs"}),
-        SetPosition(0, 11.1),
+        set_position(0, 11.1),
         Change("paths", {"stops": (Stop(home, 1 / 3), Stop(beyond)), "seconds": 1 / 3}),
-        StartRun(),
+        start_run(),
         lambda state: _end(state, 6),
-        Accept(),
+        accept(),
         Change("paths", {"stops": (Stop(3), Stop(5, 1 / 7))}),
-        Go(),
-        SetPathTime(10 / 3),
+        go(),
+        set_path_time(10 / 3),
         Change("paths", {"stops": (Stop(home), Stop(beyond)), "kind": "planned", "chosen": 1}),
         Change("paths", {"law": "duration", "duration": 0.5, "slower": 10.0, "holds_load": True}),
-        Pin(OPTIMAL),
+        pin(OPTIMAL),
         Change("compared", {"look": varied(CompareView())}),
         Set("studies", varied(Studies())),
         Set("calibrated", Calibrated("l1;é\n1", "x,y,z\n", 1 / 3, 1 / 7)),
         Set("required", Required(msgspec.structs.replace(EXAMPLE, tilt_deg=1 / 3), True)),
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),
-        BrushAxes((Brush("volume", ((1 / 3, 10.0),)),)),
-        SetFold(4, 100 / 3),
-        SetJoint(0, 99.1),
+        brush_axes((Brush("volume", ((1 / 3, 10.0),)),)),
+        set_fold(4, 100 / 3),
+        set_joint(0, 99.1),
     ]
     for action in actions:
         step = action if isinstance(action, Action) else action(state)

@@ -20,7 +20,7 @@ from explorer.app.features.loads.feature import ForcesPanel
 from explorer.app.features.loads.load import Loads, is_bare
 from explorer.app.features.loads.precision import LOAD, PrecisionPanel
 from explorer.app.features.singularity.feature import SingularityPanel
-from explorer.app.features.singularity.work import GoToStratum
+from explorer.app.features.singularity.work import go_to_stratum
 from explorer.app.features.workspace import words
 from explorer.app.features.workspace.feeds import (
     VOLUME_FEED,
@@ -31,7 +31,7 @@ from explorer.app.features.workspace.feeds import (
 from explorer.app.session.history import UserAction
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetAngle, SetPosition
+from explorer.app.state.moves import set_angle, set_position
 from explorer.app.state.state import State, open_state
 from explorer.app.widgets.blocks import content_of
 from explorer.measures.blocks import clearances, forces, precision, singularity
@@ -87,8 +87,8 @@ def machine_states() -> list[State]:
     """Return machines that hold their load and do not, with and without legs that collide."""
     begin = Set("view.forces.force", (1.0, -2.0, -10.0)).apply(open_state(typical_machine(FULL)[0]))
     begin = Set("view.swept", True).apply(begin)
-    moved = UserAction(SetPosition(0, 12.0), "drag", 100.0).apply(begin)
-    turned = SetAngle(1, 20.0).apply(thick(moved, 0.4, 0.3, 0.2, 0.5))
+    moved = UserAction(set_position(0, 12.0), "drag", 100.0).apply(begin)
+    turned = set_angle(1, 20.0).apply(thick(moved, 0.4, 0.3, 0.2, 0.5))
     heavy = Set("view.forces.force", (0.0, 0.0, -500.0)).apply(turned)
     return [
         begin,
@@ -97,7 +97,7 @@ def machine_states() -> list[State]:
         Set("view.lengths", "design units").apply(heavy),
         open_state(OPTIMAL),
         open_state(PRECISE),
-        *(GoToStratum(w).apply(heavy) for w in ((3, 4, 2, 1), (2, 1, 4, 3))),
+        *(go_to_stratum(w).apply(heavy) for w in ((3, 4, 2, 1), (2, 1, 4, 3))),
     ]
 
 
@@ -130,7 +130,7 @@ def shown_workspace(state: State, **changes: Any) -> State:
 
 
 WORKSPACES = [
-    shown_workspace(SetAngle(1, 15.0).apply(thick(open_state(LIMITED), 0.2)), **changes)
+    shown_workspace(set_angle(1, 15.0).apply(thick(open_state(LIMITED), 0.2)), **changes)
     for changes in (
         {"region": "limits", "orientation": "pose"},
         {"region": "limits", "orientation": "home"},

@@ -30,17 +30,17 @@ from socket_tab import SocketTab
 
 from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.optimise import runner
-from explorer.app.features.optimise.actions import StartRun
+from explorer.app.features.optimise.actions import start_run
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchResult
-from explorer.app.features.paths.actions import Go, Play
+from explorer.app.features.paths.actions import go, play
 from explorer.app.features.paths.state import journey_of
 from explorer.app.features.studies.state import Studies
 from explorer.app.features.view.feature import FORMS
 from explorer.app.inputs.controls import MAIN
 from explorer.app.server import Running
 from explorer.app.session.session import UNDO, Session
-from explorer.app.state.actions import Open, Set
-from explorer.app.state.moves import GoHome, SetJoint, SetPosition
+from explorer.app.state.actions import Set, open_design
+from explorer.app.state.moves import go_home, set_joint, set_position
 from explorer.app.widgets.buttons import Buttons, extra_button, press_button
 from explorer.files.extras import EXTRAS, LINUX_ALONE, install_command
 from explorer.files.packaged import SOURCES
@@ -215,21 +215,21 @@ def check_filled(running: Running, *expected: str) -> None:
 def test_each_tab_has_one_filled_button_at_most(running: Running) -> None:
     session, buttons = running.page.session, running.page.buttons
     check_filled(running, "Optimise", "Paths", "Studies")
-    session.do(SetJoint(0, 200.0))
+    session.do(set_joint(0, 200.0))
     check_filled(running, "Pose")
-    session.do(Open(PRESETS["paper-optimal"]))
+    session.do(open_design(PRESETS["paper-optimal"]))
     buttons.press("compare.pin", "", CLIENT)
     wait_for(lambda: not Compared.of(session.state).is_empty)
     check_filled(running, "Compare")
     buttons.press("studies.start", "", CLIENT)
     wait_for(lambda: Studies.of(session.state).name is not None)
     check_filled(running)
-    session.do(Go())
+    session.do(go())
     wait_for(lambda: journey_of(session.state) is not None)
     # The page does not come to rest while the path is played.
-    session.do(Play(on=False))
+    session.do(play(False))
     check_filled(running, "Paths")
-    session.do(Open(PRESETS["paper-optimal"]))
+    session.do(open_design(PRESETS["paper-optimal"]))
 
 
 def test_search_and_its_answer_leave_one_filled_button_at_most(
@@ -239,7 +239,7 @@ def test_search_and_its_answer_leave_one_filled_button_at_most(
     monkeypatch.setattr(runner, "PACE", 600.0)
     session = running.page.session
     session.do(Set("optimisation.request", ENDLESS))
-    session.do(StartRun())
+    session.do(start_run())
     wait_for(lambda: Optimisation.of(session.state).is_on)
     check_filled(running)
     running.page.buttons.press("optimise.cancel", "", CLIENT)
@@ -292,7 +292,7 @@ def test_browser_is_told_again_once_of_what_crossed_with_its_user_and_of_nothing
     page, session = running.page, running.page.session
     # However slow the machine is, the browser's answer counts as one that crossed, or as none.
     monkeypatch.setattr(assigning, "CROSSING_SECONDS", seconds)
-    session.do(GoHome())
+    session.do(go_home())
     with client_of(running) as client:
         slider = client.find("x")
 
@@ -306,7 +306,7 @@ def test_browser_is_told_again_once_of_what_crossed_with_its_user_and_of_nothing
             return values, [list(each["position"]) for each in of_gizmo if "position" in each]
 
         told()
-        session.do(SetPosition(0, 11.5))
+        session.do(set_position(0, 11.5))
         values, places = told()
         assert values == [115.0]
         (place,) = places
@@ -339,7 +339,7 @@ def test_panels_that_a_drag_leaves_no_time_for_are_drawn_with_the_next_frame(
         drag.setattr(Session, "has_changes", property(lambda _: True))
         drag.setattr("explorer.app.page.PANELS_SECONDS", -1.0)
         before = controls()
-        session.do(SetPosition(0, 1.5))
+        session.do(set_position(0, 1.5))
         assert controls() == before
     session.redraw()
     assert controls() != before

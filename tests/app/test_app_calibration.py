@@ -24,7 +24,7 @@ from explorer.app.features.calibration.feature import (
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Open
+from explorer.app.state.actions import open_design
 from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
@@ -83,7 +83,7 @@ def test_table_that_is_dropped_is_measured_or_has_the_targets(page: Services, de
     drop(page, TABLE_OF_TARGETS, "t.CSV")
     assert Calibrated.of(desk.state).targets == TABLE_OF_TARGETS
     assert Calibrated.of(desk.state).measured == table
-    desk.session.do(Open(PRESETS["paper-initial"]))
+    desk.session.do(open_design(PRESETS["paper-initial"]))
     desk.session.wait_until_idle()
     assert Calibrated.of(desk.state) == Calibrated()
     assert desk.complaints == []

@@ -16,10 +16,10 @@ from explorer.app.features.history.feature import OVER, ChangeScene, DesignChang
 from explorer.app.features.workspace.feeds import VOLUME_FEED
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import REDO, UNDO
-from explorer.app.state.actions import Action, Open, Set
+from explorer.app.state.actions import Action, Set, open_design
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.geometry import set_variable
+from explorer.app.state.moves import set_position
 from explorer.app.widgets.buttons import Buttons
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design_file import PRESETS
@@ -59,7 +59,7 @@ def watcher(server: viser.ViserServer, buttons: Buttons, desk: Desk) -> Watcher:
 
 
 def test_change_shows_the_differences_of_volume_reach_and_clearance(watcher: Watcher) -> None:
-    card = watcher.card(watcher.do(SetVariable("a3x", 20.0)))
+    card = watcher.card(watcher.do(set_variable("a3x", 20.0)))
     cells = re.sub(r"<[^>]+>", " ", card)
     before, after = (
         workspace_volume(design, OPTIMAL.home_pose.rotation).volume for design in (OPTIMAL, WIDER)
@@ -75,7 +75,7 @@ def test_change_shows_the_differences_of_volume_reach_and_clearance(watcher: Wat
 def test_page_that_never_showed_the_design_before_measures_it_too(
     server: viser.ViserServer, buttons: Buttons, desk: Desk
 ) -> None:
-    desk.session.do(SetVariable("a3x", 20.0))
+    desk.session.do(set_variable("a3x", 20.0))
     watcher = Watcher(server, buttons, desk)
     card = watcher.card(watcher.follow())
     assert f"{workspace_volume(OPTIMAL, OPTIMAL.home_pose.rotation).volume:,.0f}" in card
@@ -83,7 +83,7 @@ def test_page_that_never_showed_the_design_before_measures_it_too(
 
 
 def test_ghost_is_the_mechanism_before_the_change_to_true_size(watcher: Watcher) -> None:
-    frame = watcher.do(SetVariable("a3x", 20.0))
+    frame = watcher.do(set_variable("a3x", 20.0))
     placed = Placed(frame)
     updates: dict[str, Any] = {name: value for _, name, value in watcher.scene.updates(placed)}
     points = evaluate(OPTIMAL, watcher.desk.state.pose).points
@@ -98,13 +98,13 @@ def test_change_is_over_with_the_next_step_with_a_press_and_with_undo(
 ) -> None:
     change, desk = watcher.change, watcher.desk
     for value, end in (
-        (4.0, lambda: desk.session.do(SetPosition(0, 11.0))),
+        (4.0, lambda: desk.session.do(set_position(0, 11.0))),
         (4.25, lambda: desk.press(buttons, OVER)),
         (4.5, lambda: desk.session.do(UNDO)),
         (4.75, lambda: [desk.session.do(move) for move in (UNDO, REDO)]),
     ):
-        watcher.do(SetPosition(0, 10.0 + 0.1 * value))
-        watcher.do(SetVariable("a3y", value))
+        watcher.do(set_position(0, 10.0 + 0.1 * value))
+        watcher.do(set_variable("a3y", value))
         assert change.before is not None
         assert change.before.state.pose.position[0] == 10.0 + 0.1 * value
         end()
@@ -113,7 +113,7 @@ def test_change_is_over_with_the_next_step_with_a_press_and_with_undo(
 
 
 def test_opened_design_is_no_change_and_new_limits_are_one(watcher: Watcher) -> None:
-    watcher.do(Open(PRESETS["paper-initial"]))
+    watcher.do(open_design(PRESETS["paper-initial"]))
     assert watcher.change.before is None
     assert watcher.card(watcher.follow()) == ""
     design = watcher.desk.state.design
@@ -131,5 +131,5 @@ def test_ghost_is_drawn_only_where_one_picture_shows_both_sizes(watcher: Watcher
 
     for unit, is_drawn in ((23.0, True), (2.3e5, False), (23.0, False), (10.0, True)):
         assert has_ghost(Set("design.unit_mm", unit, "1 unit (mm)")) == is_drawn
-    assert not has_ghost(SetVariable("a3x", 1000.0))
-    assert not has_ghost(SetVariable("a3x", 20.0))
+    assert not has_ghost(set_variable("a3x", 1000.0))
+    assert not has_ghost(set_variable("a3x", 20.0))

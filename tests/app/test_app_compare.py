@@ -16,7 +16,7 @@ from hypothesis import given, strategies as st
 from limited_designs import scaled_design
 from services import StubJobs, services_for
 
-from explorer.app.features.compare.feature import ComparePanel, Pin, Unpin
+from explorer.app.features.compare.feature import ComparePanel, pin, unpin
 from explorer.app.features.compare.scene import APART, SCENES
 from explorer.app.features.compare.state import Compared, CompareView
 from explorer.app.features.compare.table import (
@@ -39,9 +39,9 @@ from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import COMPARED
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable, without_name
+from explorer.app.state.geometry import set_variable, without_name
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.storage.library import Library
@@ -79,7 +79,7 @@ def measured(design: Design) -> Measurements:
 def compared(*pinned: Design, look: CompareView | None = None, live: Design = OPTIMAL) -> State:
     state = open_state(live)
     for design in pinned:
-        state = Pin(design).apply(state)
+        state = pin(design).apply(state)
     return Set("compared.look", look or CompareView()).apply(state)
 
 
@@ -113,11 +113,11 @@ def test_actions_in_any_order_pin_at_most_three_designs_and_none_twice(
     for kind, index in actions:
         before, pinned = state, Compared.of(state).pinned
         if kind == "live":
-            state = Open(variant(index)).apply(state)
+            state = open_design(variant(index)).apply(state)
             assert Compared.of(state) == Compared.of(before)
             continue
         if kind == "unpin":
-            state = Unpin(index % 3).apply(state)
+            state = unpin(index % 3).apply(state)
             # The others keep their places, and with them their colours.
             assert Compared.of(state).pinned == (
                 *pinned[: index % 3],
@@ -126,15 +126,15 @@ def test_actions_in_any_order_pin_at_most_three_designs_and_none_twice(
             )
         elif variant(index) in pinned or None not in pinned:
             with pytest.raises(InputError, match=r"is pinned already, as|A, B, C are taken; unpin"):
-                Pin(variant(index)).apply(state)
+                pin(variant(index)).apply(state)
         else:
-            state = Pin(variant(index)).apply(state)
+            state = pin(variant(index)).apply(state)
             assert Compared.of(state).pinned[pinned.index(None)] == variant(index)
         assert len(Compared.of(state).pinned) == 3
         assert with_value(state, "compared", Compared.of(before)) == before
     renamed = msgspec.structs.replace(variant(2), name="other")
     with pytest.raises(InputError, match=r"^other is pinned already, as A; change it, or pin"):
-        Pin(renamed).apply(compared(variant(2)))
+        pin(renamed).apply(compared(variant(2)))
 
 
 @pytest.mark.parametrize("millimetres", [False, True])
@@ -303,7 +303,7 @@ def test_change_of_the_live_design_requests_its_drawing_alone(
         (letter, measured(design))
         for letter, design in zip(("live", "A", "B"), designs, strict=True)
     ]
-    follow(feeds, SetVariable("b2", 2.3).apply(state))
+    follow(feeds, set_variable("b2", 2.3).apply(state))
     (order,) = jobs.orders[3:]
     assert order.request.design == without_name(OPTIMAL.with_variable("b2", 2.3))
     # Until it comes the last one is shown, and said to be old.
@@ -319,7 +319,7 @@ def test_place_with_another_design_shows_nothing_of_the_one_before(
     follow(feeds, state)
     jobs.work()
     assert drawing_in(1, feeds[1]) is not None
-    follow(feeds, Pin(variant(2)).apply(Unpin(0).apply(state)))
+    follow(feeds, pin(variant(2)).apply(unpin(0).apply(state)))
     assert drawing_in(1, feeds[1]) is None
     jobs.work()
     assert drawing_in(1, feeds[1]) is not None
@@ -405,6 +405,6 @@ def test_design_is_pinned_by_one_press(services: Services, desk: Desk) -> None:
         desk.press(services.buttons, "compare.pin", name)
         assert Compared.of(desk.state).pinned == (INITIAL, None, None)
     # Nor is a design offered that is there already, under whatever name.
-    desk.session.do(Open(msgspec.structs.replace(OPTIMAL, name="other")))
+    desk.session.do(open_design(msgspec.structs.replace(OPTIMAL, name="other")))
     assert 'data-value="paper' not in content_of(panel, desk.state)
     assert desk.complaints == []

@@ -15,9 +15,9 @@ from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns, ro
 from explorer.app.features.feature import Services
 from explorer.app.features.history.feature import HISTORY, MOVE, UndoButtons
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import MarkSaved, Open, Set, SetName
+from explorer.app.state.actions import Set, mark_saved, open_design, set_name
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
+from explorer.app.state.geometry import set_variable
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile, encode_session
 from explorer.app.storage.user_data import UserData
@@ -64,7 +64,7 @@ def names(saved: SavedDesigns) -> list[str]:
 
 
 def save_as(desk: Desk, saved: SavedDesigns, name: str) -> None:
-    desk.session.do(SetName(name))
+    desk.session.do(set_name(name))
     saved.save(desk.state.design)
     settle(desk, saved)
 
@@ -126,7 +126,7 @@ def test_design_is_renamed_copied_deleted_and_restored(
 
 def test_opened_design_is_a_step_that_is_undone(desk: Desk, saved: SavedDesigns) -> None:
     save_as(desk, saved, "mine")
-    desk.session.do(Open(PRESETS["paper-initial"]))
+    desk.session.do(open_design(PRESETS["paper-initial"]))
     saved.open("mine")
     settle(desk, saved)
     assert desk.state.design.name == "mine"
@@ -136,16 +136,16 @@ def test_opened_design_is_a_step_that_is_undone(desk: Desk, saved: SavedDesigns)
 
 def test_design_changed_while_it_is_saved_keeps_its_change(desk: Desk) -> None:
     before = desk.state.design
-    desk.session.do(SetVariable("a3x", 15.0))
+    desk.session.do(set_variable("a3x", 15.0))
     changed = desk.state.design
-    desk.session.do(MarkSaved(before))
+    desk.session.do(mark_saved(before))
     assert (desk.state.design, desk.state.base) == (changed, before)
 
 
 @pytest.mark.parametrize("name", ["", " ", "two\nlines", "x" * 101, "\x00"])
 def test_name_of_a_design_is_one_printable_line(desk: Desk, name: str) -> None:
     with pytest.raises(InputError, match="name"):
-        SetName(name).apply(desk.state)
+        set_name(name).apply(desk.state)
 
 
 def test_upload_is_read_strictly_and_its_name_is_no_path(
@@ -160,10 +160,10 @@ def test_upload_is_read_strictly_and_its_name_is_no_path(
     # Beside the designs' own folder there is nothing new.
     assert [each.name for each in tmp_path.iterdir()] == ["designs"]
     # A session is one step; its own steps are not taken over.
-    desk.session.do(SetVariable("a3x", 15.0))
+    desk.session.do(set_variable("a3x", 15.0))
     changed = desk.state.design
     session = encode_session(desk.session.history)
-    desk.session.do(Open(OPTIMAL))
+    desk.session.do(open_design(OPTIMAL))
     for encoding in ("utf-8", "utf-8-sig", "utf-16"):
         saved.take(session.decode().encode(encoding), "left.json")
         settle(desk, saved)
@@ -273,7 +273,7 @@ def test_undo_right_after_a_deletion_brings_the_design_back(
     # What was done since is undone first, and then nothing is left to bring back.
     saved.delete("mine")
     settle(desk, saved)
-    desk.session.do(SetVariable("b2", 3.0))
+    desk.session.do(set_variable("b2", 3.0))
     settle(desk, saved)
     assert "Delete mine" not in bar(Frame(desk.state))
     desk.press(buttons, MOVE, "Undo")

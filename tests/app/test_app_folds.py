@@ -29,10 +29,10 @@ from explorer.app.features.singularity.feature import fold_dial
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Open, Set
-from explorer.app.state.folds import SetFold, folds_of
+from explorer.app.state.actions import Set, open_design
+from explorer.app.state.folds import folds_of, set_fold
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetMode, SetPose
+from explorer.app.state.moves import set_mode, set_pose
 from explorer.app.state.state import State, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.errors import InputError
@@ -46,7 +46,7 @@ from explorer.singularity.colours import SINGULAR, proximity_colour
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = open_state(OPTIMAL)
 R = FOLDS.index("r")
-STATES = [SetMode(mode).apply(state) for state in random_states(3) for mode in range(8)]
+STATES = [set_mode(mode).apply(state) for state in random_states(3) for mode in range(8)]
 # Indices of the margins that each coordinate changes.
 CHANGED = ((0, 1, 2), (1, 2), (0, 1), (0,), (1,), (2,))
 
@@ -70,7 +70,7 @@ def test_coordinate_is_set_alone_and_changes_its_margins_alone(state: State, ind
     low, high = walls(state, index)
     for share in (0.7, 0.01, 0.4):
         value = low + share * (high - low)
-        state = SetFold(index, value).apply(state)
+        state = set_fold(index, value).apply(state)
         after = folds_of(state)
         assert after[index] == value
         assert after[:index] == before[:index]
@@ -92,13 +92,13 @@ def test_wall_is_reached_in_the_same_mode_and_left_with_all_others_as_they_were(
     before = folds_of(state)
     # The upper end of r is no wall.
     for wall in walls(state, index)[: 1 if index == R else 2]:
-        flat = SetFold(index, wall).apply(state)
+        flat = set_fold(index, wall).apply(state)
         assert flat.mode == state.mode
         assert folds_of(flat)[index] == wall
         assert Frame(flat).verdict.kind == "singular"
         # The ends of all sliders stay.
         assert [walls(flat, each) for each in range(6)] == [walls(state, i) for i in range(6)]
-        again = SetFold(index, before[index]).apply(flat)
+        again = set_fold(index, before[index]).apply(flat)
         assert folds_of(again) == before
         assert_allclose(again.joints, state.joints, atol=1e-12)
 
@@ -107,9 +107,9 @@ def test_wall_is_reached_in_the_same_mode_and_left_with_all_others_as_they_were(
 @pytest.mark.parametrize("wall", [0.0, 180.0])
 def test_flat_fold_belongs_to_both_modes(index: int, wall: float) -> None:
     bit = 4 >> (index - 3)
-    start = SetMode(bit).apply(HOME)
-    flat = SetFold(index, wall).apply(start)
-    other = SetMode(flat.mode & ~bit).apply(flat)
+    start = set_mode(bit).apply(HOME)
+    flat = set_fold(index, wall).apply(start)
+    other = set_mode(flat.mode & ~bit).apply(flat)
     assert folds_of(flat)[index] == wall
     assert folds_of(other)[index] == pytest.approx(-wall, abs=1e-5)
     assert walls(other, index) == (-180.0, 0.0)
@@ -117,11 +117,11 @@ def test_flat_fold_belongs_to_both_modes(index: int, wall: float) -> None:
 
 def test_fold_of_the_other_sign_goes_to_the_other_mode() -> None:
     for index, mode in itertools.product(range(3, 6), range(8)):
-        state = SetMode(mode).apply(HOME)
-        after = SetFold(index, -folds_of(state)[index]).apply(state)
+        state = set_mode(mode).apply(HOME)
+        after = set_fold(index, -folds_of(state)[index]).apply(state)
         assert after.mode == mode ^ (4 >> (index - 3)) == int(mode_of(margins_of(after)))
         # It is the mirror image that the same legs allow.
-        there = SetMode(after.mode).apply(state)
+        there = set_mode(after.mode).apply(state)
         assert_allclose(after.pose.position, there.pose.position, atol=1e-9)
 
 
@@ -134,17 +134,17 @@ def test_coordinate_beyond_its_range_is_refused(index: int, value: float) -> Non
     if value == math.inf:
         range_of = "finite"
     with pytest.raises(InputError, match=f"{FOLDS[index]}.*{range_of}"):
-        SetFold(index, value).apply(HOME)
+        set_fold(index, value).apply(HOME)
 
 
 @given(st.integers(0, 5), st.floats(0.0, 1.0), st.integers(0, 7))
 def test_folds_that_were_set_count_for_their_pose_alone(
     index: int, share: float, mode: int
 ) -> None:
-    state = SetMode(mode).apply(HOME)
+    state = set_mode(mode).apply(HOME)
     low, high = walls(state, index)
-    state = SetFold(index, low + share * (high - low)).apply(state)
-    moved = SetPose(HOME.pose).apply(state)
+    state = set_fold(index, low + share * (high - low)).apply(state)
+    moved = set_pose(HOME.pose).apply(state)
     assert_allclose(folds_of(moved), folds_of(HOME), atol=1e-9)
     # What the pose tells alone gives the same margins.
     told = folds_of(replace(state, set_folds=None))
@@ -194,7 +194,7 @@ def test_choice_shows_six_sliders_in_place_of_six_and_is_kept(
     desk.press(services.buttons, "view.coordinates", "lengths")
     assert list(sliders_of(panel, desk)) == list(JOINT_LABELS.values())
     # It stays with the next design, and in the file of the session.
-    assert Open(PRESETS["paper-initial"]).apply(after).view.coordinates == "folds"
+    assert open_design(PRESETS["paper-initial"]).apply(after).view.coordinates == "folds"
     saved = decode_session(encode_session(start_history(after)), "test")
     assert saved.step.state.view.coordinates == "folds"
     desk.press(services.buttons, "view.coordinates", "position")
@@ -207,7 +207,7 @@ def test_slider_sets_a_fold_within_the_walls_of_the_mode_and_is_undone(
     panel = MovePanel(services)
     desk.session.do(Set("view.coordinates", "folds"))
     for mode in range(8):
-        desk.session.do(SetMode(mode))
+        desk.session.do(set_mode(mode))
         sliders = sliders_of(panel, desk)
         for index, sign in enumerate(signs_of(mode), start=1):
             slider = sliders[f"φ{index} (°)"]
@@ -215,7 +215,7 @@ def test_slider_sets_a_fold_within_the_walls_of_the_mode_and_is_undone(
         for name in "βε":
             assert (sliders[f"{name} (°)"].min, sliders[f"{name} (°)"].max) == (0.0, 180.0)
         assert sliders["r"].min == 0.0
-    desk.session.do(SetMode(1))
+    desk.session.do(set_mode(1))
     before = desk.state
     slider = sliders_of(panel, desk)["φ2 (°)"]
     desk.use(slider, -45.0)
@@ -251,7 +251,7 @@ def test_stops_of_a_track_have_the_colours_of_the_margins_there(state: State, in
     assert shares[-1] == 1.0
     assert (stops[-1][0] == SINGULAR) == (index != R)
     for share in {share for _, share in stops}:
-        there = SetFold(index, low + share * (high - low)).apply(state)
+        there = set_fold(index, low + share * (high - low)).apply(state)
         level = np.abs(margins_of(there))[list(CHANGED[index])].min() / state.warn_below
         # Where the colour jumps there are two stops, one of which may be that of the other side.
         assert (

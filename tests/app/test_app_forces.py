@@ -25,9 +25,9 @@ from explorer.app.features.loads.load import (
     FITTING,
     WEIGHTS_FEED,
     Loads,
-    SetForce,
     fitting_scale,
     nearest_feed,
+    set_force,
 )
 from explorer.app.features.loads.precision import (
     BUDGET_FEED,
@@ -209,7 +209,7 @@ def test_pull_at_the_handle_sets_the_force_and_leaves_the_handle(services: Servi
     for _ in range(5):
         handle.handle.position = tuple(rng.normal(size=3).tolist())
         force = handle.force(state)
-        state = SetForce(force, keeps_scale=True).apply(state)
+        state = set_force(force, keeps_scale=True).apply(state)
         updates = list(handle.updates(Placed(Frame(state))))
         assert "position" not in {name for _, name, _ in updates}
         tip = load_tip(Placed(Frame(state)))
@@ -235,7 +235,7 @@ def test_moment_is_in_newton_metres_whatever_the_unit(unit_mm: float) -> None:
 @pytest.mark.parametrize("force", [(math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (0.0, 1e41, 0.0)])
 def test_force_that_is_not_finite_is_refused(force: tuple[float, float, float]) -> None:
     with pytest.raises(InputError, match=r"^the force, in N, must [^\n]*$"):
-        SetForce(force).apply(loaded_state())
+        set_force(force).apply(loaded_state())
 
 
 def test_share_has_words_and_a_look() -> None:
@@ -308,7 +308,7 @@ def test_design_without_load_and_limits_is_told_what_to_enter(
     assert limited_parts(desk.state.design).all()
     assert "Assume" not in markup_of(panel, desk.state)
     assert services.get(load_figure)(Frame(desk.state)) == ""
-    desk.session.do(SetForce((0.0, 0.0, -10.0)))
+    desk.session.do(set_force((0.0, 0.0, -10.0)))
     assert "Holds the load" in markup_of(panel, desk.state)
 
 

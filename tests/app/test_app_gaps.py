@@ -31,13 +31,13 @@ from explorer.app.features.mechanism.incidences import (
     visible_gaps,
 )
 from explorer.app.features.singularity.feature import SingularityPanel, distance_table
-from explorer.app.features.singularity.work import GoToSingularity, GoToStratum
+from explorer.app.features.singularity.work import go_to_singularity, go_to_stratum
 from explorer.app.features.view.feature import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import linear_colour, of_one_colour, plate
-from explorer.app.state.actions import Open
+from explorer.app.state.actions import open_design
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import GoHome, SetJoint, SetPose
+from explorer.app.state.moves import go_home, set_joint, set_pose
 from explorer.app.state.state import State, open_state
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
@@ -54,7 +54,7 @@ Drawn = dict[str, dict[str, Any]]
 def approaching(incidence: int) -> list[State]:
     """Return states from the home pose on to the nearest pose with an incidence."""
     start = open_state(OPTIMAL)
-    goal = GoToSingularity(incidence).apply(start).pose
+    goal = go_to_singularity(incidence).apply(start).pose
     a, b = np.array(start.pose.quaternion), np.array(goal.quaternion)
     b *= math.copysign(1.0, float(a @ b))
     states: list[State] = []
@@ -62,14 +62,14 @@ def approaching(incidence: int) -> list[State]:
         position = (1.0 - share) * np.array(start.pose.position) + share * np.array(goal.position)
         w, x, y, z = ((1.0 - share) * a + share * b).tolist()
         px, py, pz = position.tolist()
-        states.append(SetPose(Pose((px, py, pz), (w, x, y, z))).apply(start))
-    return [*states, SetPose(goal).apply(start)]
+        states.append(set_pose(Pose((px, py, pz), (w, x, y, z))).apply(start))
+    return [*states, set_pose(goal).apply(start)]
 
 
 @functools.cache
 def scenes() -> list[Placed]:
     """Return scenes of random poses, on the way to each incidence, and of every stratum."""
-    singular = (GoToStratum(w).apply(open_state(OPTIMAL)) for w in STRATA if w != GENERIC)
+    singular = (go_to_stratum(w).apply(open_state(OPTIMAL)) for w in STRATA if w != GENERIC)
     near = itertools.chain.from_iterable(map(approaching, (1, 2, 3)))
     return [Placed(Frame(state)) for state in (*random_states(12, seed=5), *near, *singular)]
 
@@ -212,7 +212,9 @@ def test_designs_of_any_size_are_drawn_alike(factor: float) -> None:
     for one in scenes()[::5]:
         state = one.frame.state
         x, y, z = (factor * np.array(state.pose.position)).tolist()
-        scaled = SetPose(Pose((x, y, z), state.pose.quaternion)).apply(Open(design).apply(state))
+        scaled = set_pose(Pose((x, y, z), state.pose.quaternion)).apply(
+            open_design(design).apply(state)
+        )
         other = Placed(Frame(scaled))
         ratio = other.reach / one.reach
         for a, b in zip(approaches(one, None), approaches(other, None), strict=True):
@@ -314,7 +316,7 @@ def test_switch_of_a_tetrahedron_hides_its_edges_name_faces_and_gap(
 def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
     tetrahedra: Tetrahedra,
 ) -> None:
-    state = SetJoint(0, 1000.0).apply(open_state(OPTIMAL))
+    state = set_joint(0, 1000.0).apply(open_state(OPTIMAL))
     assert state.unclosed is not None
     nodes = draw(tetrahedra, viewed(state, tetrahedra=(False, False, False)))
     outlined = {i for i in range(3) if nodes[f"/tetrahedra/{i + 1}/edges"]["visible"]}
@@ -341,7 +343,7 @@ def test_gizmo_is_put_back_only_once_the_platform_has_followed_its_last_movement
         asyncio.run(callback(SimpleNamespace(client_id=1)))
     assert desk.state.pose == handle.pose(desk.state)
     assert not written()
-    desk.session.do(GoHome())
+    desk.session.do(go_home())
     assert written()
 
 

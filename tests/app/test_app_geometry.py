@@ -15,19 +15,19 @@ from sample_states import iterates_of, rich_state, varied
 from explorer import Actuators, Design, Limits, Pose, Tolerances
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.feature import DesignPanel
-from explorer.app.features.optimise.actions import EndRun, Revert, StartRun, TakePaperProblem
+from explorer.app.features.optimise.actions import end_run, revert, start_run, take_paper_problem
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchResult
 from explorer.app.features.optimise.work import PAPER_REQUEST
 from explorer.app.features.paths.state import Paths, Stop
 from explorer.app.session.history import start_history
-from explorer.app.state.actions import Open, Reset, Set
+from explorer.app.state.actions import Set, open_design, reset_design
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import (
-    ClearMachine,
-    SetVariable,
+    clear_machine,
     open_geometry,
     preset_of,
     set_unit,
+    set_variable,
 )
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, open_state
@@ -123,7 +123,7 @@ def test_presets_and_unit_of_the_page_keep_payload_actuators_and_demands(
         setattr(handle, name, value)
         named[getattr(handle, "label", "")] = handle
     asked = with_value(asked, "optimisation.request.reach", 25.0)
-    desk.session.do(Open(asked.design))
+    desk.session.do(open_design(asked.design))
     desk.session.do(Set("optimisation", Optimisation.of(asked)))
     desk.session.do(Set("view", asked.view))
     for label, value in (("Preset", "paper-initial"), ("1 unit (mm)", 40.0)):
@@ -146,9 +146,9 @@ def test_preset_changes_the_geometry_alone(asked: State) -> None:
     assert Paths.of(after) == Paths.of(asked)
     assert Optimisation.of(after).request == Optimisation.of(asked).request
     assert preset_of(after.design) == "paper-initial"
-    assert preset_of(SetVariable("b2", 2.5).apply(after).design) is None
+    assert preset_of(set_variable("b2", 2.5).apply(after).design) is None
     assert preset_of(after.design.with_limits(gap=0.5)) is None
-    assert ClearMachine().apply(after).design == INITIAL
+    assert clear_machine().apply(after).design == INITIAL
 
 
 @pytest.mark.parametrize(("unit", "is_preset"), [(40.0, False), (2.5, False), (40.0, True)])
@@ -187,12 +187,12 @@ def test_design_units_that_were_asked_for_stay_where_the_page_shows_them(asked: 
 
 def test_file_brings_its_machine_and_what_was_asked_stays_in_its_millimetres(asked: State) -> None:
     design = msgspec.structs.replace(PRECISE, unit_mm=40.0)
-    after = Open(design).apply(asked)
+    after = open_design(design).apply(asked)
     assert after.design == design
     kept = [path for path in LENGTHS if not path.startswith("design")]
     before = millimetres(asked)
     assert [millimetres(after)[path] for path in kept] == pytest.approx([before[p] for p in kept])
-    assert Reset().apply(with_unit(after, 10.0)).design == design
+    assert reset_design().apply(with_unit(after, 10.0)).design == design
 
 
 def test_undo_of_another_unit_keeps_what_is_shown(asked: State) -> None:
@@ -202,7 +202,7 @@ def test_undo_of_another_unit_keeps_what_is_shown(asked: State) -> None:
 
 
 def test_paper_problem_keeps_the_machine_but_for_the_radii(asked: State) -> None:
-    after = TakePaperProblem().apply(asked)
+    after = take_paper_problem().apply(asked)
     assert machine_of(after.design) == machine_of(asked.design)
     assert geometry_of(after.design)[1:7] == geometry_of(INITIAL)[1:7]
     assert after.design.limits == OPTIMAL.limits
@@ -251,15 +251,15 @@ def test_every_number_of_view_paths_and_request_is_a_declared_length_or_none() -
 
 def test_state_with_everything_in_it_takes_another_unit_and_a_preset() -> None:
     state = with_geometry(with_unit(rich_state(), 3.0), INITIAL)
-    assert ClearMachine().apply(state).design == INITIAL
+    assert clear_machine().apply(state).design == INITIAL
 
 
 def test_result_that_is_given_up_after_another_unit_leaves_what_was_shown(asked: State) -> None:
-    state = StartRun().apply(asked)
+    state = start_run().apply(asked)
     iterates = iterates_of(state, 2)
-    end = EndRun(1, SearchResult("converged", "It ended.", iterates[-1]), iterates)
+    end = end_run(1, SearchResult("converged", "It ended.", iterates[-1]), iterates)
     other = with_unit(end.apply(state), 40.0)
-    back = Revert().apply(other)
+    back = revert().apply(other)
     assert (back.design, back.pose, Paths.of(back)) == (asked.design, asked.pose, Paths.of(asked))
     found, expected = millimetres(back), millimetres(asked)
     assert found == pytest.approx(expected, rel=1e-14)

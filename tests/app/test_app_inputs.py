@@ -34,7 +34,7 @@ from explorer.app.inputs.ranges import (
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetJoint, SetPosition
+from explorer.app.state.moves import set_joint, set_position
 from explorer.app.state.state import open_state
 from explorer.errors import DesignError
 from explorer.measures.field_words import FIELD_WORDS, message_of
@@ -133,7 +133,7 @@ def test_length_typed_in_mm_is_the_state_of_its_value_in_design_units(
     design = msgspec.structs.replace(OPTIMAL, unit_mm=float(unit_mm))
     in_mm = open_state(design)
     in_units = Set("view.lengths", "design units").apply(in_mm)
-    bound = in_unit(item(lambda frame: frame.state.position, 0, SetPosition), 1)
+    bound = in_unit(item(lambda frame: frame.state.position, 0, set_position), 1)
     typed = float(value * Decimal(unit_mm))
     action, same = bound.write(in_mm, typed), bound.write(in_units, float(value))
     assert action is not None
@@ -143,9 +143,9 @@ def test_length_typed_in_mm_is_the_state_of_its_value_in_design_units(
     assert bound.read(Frame(after)) == typed
     # Neither the switch nor a value that is typed as it stands changes a bit.
     assert replace(in_units, view=in_mm.view) == in_mm
-    joint = in_unit(item(lambda frame: frame.state.joints, 0, SetJoint), 1)
+    joint = in_unit(item(lambda frame: frame.state.joints, 0, set_joint), 1)
     again = joint.write(in_mm, joint.read(Frame(in_mm)))
-    assert again == SetJoint(0, in_mm.joints[0])
+    assert again == set_joint(0, in_mm.joints[0])
 
 
 @given(st.floats(-1e3, 0.0), st.floats(1e-2, 1e3), st.floats(1e-6, 1e6))
@@ -170,7 +170,7 @@ def test_track_only_grows_while_its_own_slider_moves(services: Services, desk: D
         desk.use(slider, value)
         handles(panel, desk, viser.GuiSliderHandle)
         assert (slider.min, slider.max) == (usual[0], 60.0)
-    desk.session.do(SetPosition(0, 11.0))
+    desk.session.do(set_position(0, 11.0))
     handles(panel, desk, viser.GuiSliderHandle)
     assert (slider.min, slider.max) == usual
 
@@ -182,7 +182,7 @@ def test_leg_that_is_typed_beyond_its_track_is_on_it(services: Services, desk: D
         each for each in handles(panel, desk, viser.GuiSliderHandle).values() if each.visible
     ]
     for joint, value in enumerate((40.0, -30.0, 45.0, 60.0, 50.0, 41.0)):
-        desk.session.do(SetJoint(joint, value))
+        desk.session.do(set_joint(joint, value))
         handles(panel, desk, viser.GuiSliderHandle)
         assert sliders[joint].value == value
         assert all(slider.min <= slider.value <= slider.max for slider in sliders)
@@ -196,7 +196,7 @@ def test_field_shows_no_rounding_error(
     services: Services, desk: Desk, value: float, shown: float
 ) -> None:
     panel = MovePanel(services)
-    desk.session.do(SetPosition(0, value))
+    desk.session.do(set_position(0, value))
     assert repr(handles(panel, desk, viser.GuiSliderHandle)["x"].value) == repr(shown)
 
 

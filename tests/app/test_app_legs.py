@@ -35,7 +35,7 @@ from explorer.app.scene.surfaces import COLLIDING, PLAIN
 from explorer.app.session.history import UserAction
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetPose, SetPosition
+from explorer.app.state.moves import set_pose, set_position
 from explorer.app.state.state import State, open_state
 from explorer.app.widgets.blocks import render
 from explorer.errors import InputError
@@ -216,7 +216,7 @@ def test_move_requests_a_drawing_only_if_paths_start_at_the_pose(
 ) -> None:
     services = services_for()
     state = show(THICK, start=start, region=region)
-    for each in (state, SetPosition(2, 8.0).apply(state)):
+    for each in (state, set_position(2, 8.0).apply(state)):
         services.get(WORKSPACE_FEED).follow(Frame(each))
     assert isinstance(services.jobs, StubJobs)
     assert len(services.jobs.orders) == orders
@@ -322,7 +322,7 @@ END = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
 
 def swept(start: State) -> State:
     """Return the state after a move to END, its swept tetrahedra shown."""
-    return UserAction(SetPose(END), "drag", 100.0).apply(viewed(start, swept=True))
+    return UserAction(set_pose(END), "drag", 100.0).apply(viewed(start, swept=True))
 
 
 # With legs of different radii.

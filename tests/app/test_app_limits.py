@@ -19,7 +19,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.feature import DesignPanel
 from explorer.app.features.optimise.words import limit_rows
 from explorer.app.features.sharing.reporting import make_report
-from explorer.app.state.actions import Open
+from explorer.app.state.actions import open_design
 from explorer.app.state.frame import Frame
 from explorer.numerics.number_text import UNITS
 from explorer.workspace.limits.constraints import angle_between
@@ -116,7 +116,7 @@ def test_limit_added_to_the_table_is_told_and_listed(leaning: Design) -> None:
 def test_limit_added_to_the_table_has_a_slider(
     leaning: Design, services: Services, desk: Desk
 ) -> None:
-    desk.session.do(Open(leaning))
+    desk.session.do(open_design(leaning))
     panel = DesignPanel(services)
     sliders: dict[str, Any] = {}
     for handle, name, value in panel.updates(Frame(desk.state)):

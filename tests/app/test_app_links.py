@@ -15,9 +15,9 @@ from sample_states import Sample, rich_state, samples, states_of
 from explorer.app.features.sharing.links import (
     LONGEST,
     Link,
-    OpenLink,
     decode_link,
     encode_link,
+    open_link,
 )
 from explorer.app.state.state import State, open_state
 from explorer.errors import InputError
@@ -39,7 +39,7 @@ def test_link_holds_design_requirement_pose_and_view_of_any_state(actions: list[
 
 def test_link_of_a_state_without_any_default_holds_all_of_it() -> None:
     rich = rich_state()
-    opened = OpenLink(decode_link(encode_link(rich))).apply(OPTIMAL)
+    opened = open_link(decode_link(encode_link(rich))).apply(OPTIMAL)
     assert (opened.design, opened.pose, opened.view) == (rich.design, rich.pose, rich.view)
     assert opened.parts["required"] == rich.parts["required"]
     # Nothing else comes with it.
@@ -54,7 +54,7 @@ def test_link_of_the_first_schema_is_read() -> None:
 
 def test_name_of_a_preset_is_a_link_to_it() -> None:
     for design in PRESETS.values():
-        assert OpenLink(decode_link(design.name)).apply(OPTIMAL) == open_state(design)
+        assert open_link(decode_link(design.name)).apply(OPTIMAL) == open_state(design)
 
 
 @pytest.mark.parametrize("state", [OPTIMAL, rich_state()])

@@ -16,11 +16,11 @@ from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from explorer.app.features.feature import Services
-from explorer.app.features.machine.feature import MachinePanel, SetToolAngle
+from explorer.app.features.machine.feature import MachinePanel, set_tool_angle
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.scene.placing import HALF_JOINT, Placed
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
 from explorer.app.state.view import PrototypeView
@@ -250,7 +250,7 @@ def test_fields_of_all_tolerances_show_the_largest(hand: Hand) -> None:
 
 
 def test_limit_of_the_pull_alone_is_shown_and_kept(services: Services, desk: Desk) -> None:
-    desk.session.do(Open(design_with(actuators=Actuators(pull_n=six(90.0)))))
+    desk.session.do(open_design(design_with(actuators=Actuators(pull_n=six(90.0)))))
     hand = Hand(services, desk)
     assert hand.controls["Limited forces"].value
     assert not hand.controls["Push (N)"].visible
@@ -297,7 +297,7 @@ def test_direction_of_gravity_keeps_length_one(hand: Hand) -> None:
 def test_impossible_value_gets_one_line_and_changes_nothing(
     services: Services, desk: Desk, label: str, value: object, message: str
 ) -> None:
-    desk.session.do(Open(PRESS))
+    desk.session.do(open_design(PRESS))
     hand = Hand(services, desk)
     before, shown, steps = desk.state, hand.controls[label].value, desk.session.history.at
     hand.set(label, value)
@@ -315,7 +315,7 @@ def test_tool_angles_are_kept_as_set_and_turn_as_the_pose_does(
 ) -> None:
     state, angles = open_state(OPTIMAL), [0.0, 0.0, 0.0]
     for axis, angle in turns:
-        state = SetToolAngle(axis, angle).apply(state)
+        state = set_tool_angle(axis, angle).apply(state)
         angles[axis] = angle
         # Also at a pitch of 90°, where yaw and roll turn about one axis.
         assert state.tool_angles == tuple(angles)
@@ -325,8 +325,8 @@ def test_tool_angles_are_kept_as_set_and_turn_as_the_pose_does(
 
 
 def test_tool_angles_of_a_design_that_is_opened_are_its_own(desk: Desk) -> None:
-    desk.session.do(SetToolAngle(0, 30.0))
-    desk.session.do(SetToolAngle(1, 120.0))
+    desk.session.do(set_tool_angle(0, 30.0))
+    desk.session.do(set_tool_angle(1, 120.0))
     assert desk.state.tool_angles == (30.0, 120.0, 0.0)
     # The same orientation with a pitch within 90°.
     reopened = open_state(desk.state.design)
@@ -335,7 +335,7 @@ def test_tool_angles_of_a_design_that_is_opened_are_its_own(desk: Desk) -> None:
     other = replace(reopened, set_tool_angles=(1.0, 2.0, 3.0))
     assert other.tool_angles == reopened.tool_angles
     with pytest.raises(InputError, match="finite"):
-        SetToolAngle(2, math.inf).apply(reopened)
+        set_tool_angle(2, math.inf).apply(reopened)
 
 
 # Words
@@ -343,7 +343,7 @@ def test_tool_angles_of_a_design_that_is_opened_are_its_own(desk: Desk) -> None:
 
 def test_panel_tells_the_weight_and_the_moment(hand: Hand, desk: Desk) -> None:
     assert "Their moment has no limit." in hand.show()
-    desk.session.do(Open(PRESS))
+    desk.session.do(open_design(PRESS))
     shown = hand.show()
     assert "19.61 N" in shown
     # Of a tube of 8 and 6 mm at 200 MPa: σ π (D⁴ − d⁴) / (32 D).

@@ -17,7 +17,7 @@ from services import StubJobs
 from explorer.app.features.designs.feature import UNSAVED
 from explorer.app.server import Running, start
 from explorer.app.session.session import move_to
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.moves import set_position
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
@@ -183,12 +183,12 @@ def test_theme_is_that_of_each_browser_and_no_step_of_the_history(tmp_path: Path
 def test_step_names_its_browser_to_others_and_who_undoes_it_is_told_to_it(tmp_path: Path) -> None:
     with explorer_with(data_in(tmp_path)) as running, client_of(running) as one:
         session = running.page.session
-        session.do(SetPosition(0, 11.0), who=one.client_id)
+        session.do(set_position(0, 11.0), who=one.client_id)
         assert session.wait_until_idle()
         one.read_all_sent(running)
         assert "ex-author" not in str(one.controls)
         with client_of(running) as other:
-            session.do(SetPosition(0, 12.0), who=other.client_id)
+            session.do(set_position(0, 12.0), who=other.client_id)
             assert session.wait_until_idle()
             other.read_all_sent(running)
             for client in (one, other):

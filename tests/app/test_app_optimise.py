@@ -26,14 +26,14 @@ from services import services_for
 from explorer.app.features.compare.table import ComparedDesign
 from explorer.app.features.optimise import runner as optimiser
 from explorer.app.features.optimise.actions import (
-    Accept,
-    AddIterates,
-    CancelRun,
-    Compare,
-    EndRun,
-    LiftLimit,
-    Revert,
-    StartRun,
+    accept,
+    add_iterates,
+    cancel_run,
+    compare,
+    end_run,
+    lift_limit,
+    revert,
+    start_run,
 )
 from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, LIFT, PAPER, REVERT, START
 from explorer.app.features.optimise.feature import (
@@ -66,10 +66,10 @@ from explorer.app.features.optimise.work import (
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.server import start as start_page
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Action, Open, Reset, Set
+from explorer.app.state.actions import Action, Set, open_design, reset_design
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
-from explorer.app.state.moves import SetAngle, SetJoint, SetPosition
+from explorer.app.state.geometry import set_variable
+from explorer.app.state.moves import set_angle, set_joint, set_position
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View
@@ -98,7 +98,7 @@ ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=
 
 def own_state() -> State:
     """Return the paper's start in a pose of its own, held by its legs."""
-    turned = SetAngle(1, 3.0).apply(SetPosition(0, 4.5).apply(open_state(paper_start())))
+    turned = set_angle(1, 3.0).apply(set_position(0, 4.5).apply(open_state(paper_start())))
     return replace(turned, hold="legs")
 
 
@@ -108,7 +108,7 @@ def ask(request: OptimisationRequest, state: State) -> State:
 
 def start(request: OptimisationRequest = SMALL, state: State | None = None) -> State:
     """Return a state with a run, without a process."""
-    return StartRun().apply(ask(request, own_state() if state is None else state))
+    return start_run().apply(ask(request, own_state() if state is None else state))
 
 
 def end(state: State, iterates: tuple[Iterate, ...] = ()) -> State:
@@ -116,7 +116,7 @@ def end(state: State, iterates: tuple[Iterate, ...] = ()) -> State:
     iterates = iterates or iterates_of(state, 3)
     run = run_of(state)
     result = result_of(replace(run, phase="cancelling"), "", iterates)
-    return EndRun(run.number, result, iterates).apply(state)
+    return end_run(run.number, result, iterates).apply(state)
 
 
 def run_of(state: State) -> SearchRun:
@@ -158,9 +158,9 @@ def found() -> State:
     run, iterates = run_of(state), list[Iterate]()
     outcome = optimise(run.problem, run.starts, Channel(iterates.append, lambda: False))
     result = result_of(run, outcome, ())
-    ended = EndRun(run.number, result, tuple(iterates)).apply(state)
+    ended = end_run(run.number, result, tuple(iterates)).apply(state)
     both = compare_designs(run.problem, run.own.design, outcome.design)
-    return Compare(run.number, both).apply(ended)
+    return compare(run.number, both).apply(ended)
 
 
 # Searches in a process
@@ -193,7 +193,7 @@ class Bench(Desk):
 
     def search(self, request: OptimisationRequest, iterates: int) -> int:
         """Start a search, wait for some iterates, and return the number of its process."""
-        self.do(Open(paper_start()), Set("optimisation.request", request))
+        self.do(open_design(paper_start()), Set("optimisation.request", request))
         self.push(START)
         self.wait(lambda s: Optimisation.of(s).is_on and len(run_of(s).iterates) >= iterates)
         return self.jobs.process_ids(optimiser.SEARCH)[0]
@@ -217,7 +217,7 @@ def bench(server: viser.ViserServer) -> Iterator[Bench]:
 def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     bench: Bench, found: State
 ) -> None:
-    bench.do(SetPosition(0, 9.0))
+    bench.do(set_position(0, 9.0))
     before = bench.state
     bench.push(PAPER)
     asked = bench.state
@@ -291,7 +291,7 @@ def test_search_under_way_is_kept_when_the_explorer_stops(
     monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
     running = start_page(paper_start(), port=0, user_data=open_user_data(resume=True))
     session = running.page.session
-    for action in (Set("optimisation.request", ENDLESS), StartRun()):
+    for action in (Set("optimisation.request", ENDLESS), start_run()):
         session.do(action)
     wait_for(lambda: len(getattr(Optimisation.of(session.state).run, "iterates", ())) >= 3)
     running.stop()
@@ -303,7 +303,7 @@ def test_search_under_way_is_kept_when_the_explorer_stops(
     assert run.verdict is not None
     assert (run.phase, run.verdict.status) == ("ended", "cancelled")
     assert state.design.variables == best_of(run).design.variables
-    assert Revert().apply(state).design == paper_start()
+    assert revert().apply(state).design == paper_start()
 
 
 def test_killed_process_leaves_the_design_and_the_panel_says_so(bench: Bench) -> None:
@@ -323,22 +323,22 @@ def test_killed_process_leaves_the_design_and_the_panel_says_so(bench: Bench) ->
 # Runs and their ends
 
 
-@pytest.mark.parametrize("own", [own_state(), SetJoint(0, 25.0).apply(own_state())])
+@pytest.mark.parametrize("own", [own_state(), set_joint(0, 25.0).apply(own_state())])
 def test_revert_restores_design_and_pose_exactly_and_keeps_the_view(own: State) -> None:
     ended = end(start(state=own))
     assert ended.unclosed is None
     view = replace(ended.view, labels=False)
     state = ended
-    for action in (Set("view", view), SetPosition(2, 8.0), SetVariable("b2", 3.3)):
+    for action in (Set("view", view), set_position(2, 8.0), set_variable("b2", 3.3)):
         state = action.apply(state)
     assert state.design != own.design
-    after = Revert().apply(state)
+    after = revert().apply(state)
     assert mechanism_of(after) == mechanism_of(own)
     assert (after.hold, after.view) == (own.hold, view)
     assert Optimisation.of(after).run is None
     assert Optimisation.of(after).request == SMALL
     # There is nothing to return from any more.
-    assert Revert().apply(after) == after
+    assert revert().apply(after) == after
 
 
 def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened(
@@ -350,7 +350,7 @@ def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened
     assert "Volume 8,000 cm³ after" in search_words(found)
     assert notice.buttons == (ACCEPT, REVERT)
     assert (buttons_of(found)[ACCEPT], buttons_of(found)[REVERT]) == ("filled", "enabled")
-    after = Accept().apply(found)
+    after = accept().apply(found)
     assert search_notice(after) is None
     assert after.design.variables == best_of(run_of(after)).design.variables
     assert not {ACCEPT, REVERT} & {*buttons_of(after)}
@@ -359,35 +359,35 @@ def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened
     assert record is not None
     assert record.problem == run_of(after).problem
     assert record.design.variables == after.design.variables
-    assert Revert().apply(after) == after
-    again = Reset().apply(after)
+    assert revert().apply(after) == after
+    again = reset_design().apply(after)
     assert (again.design, Optimisation.of(again).record) == (paper_start(), None)
 
 
 def test_run_from_an_undecided_result_still_reverts_to_the_own_design() -> None:
     ended = end(start())
-    again = StartRun().apply(ended)
+    again = start_run().apply(ended)
     assert run_of(again).number == 2
     assert run_of(again).problem.start.variables == ended.design.variables
-    assert mechanism_of(Revert().apply(end(again))) == mechanism_of(own_state())
-    accepted = StartRun().apply(Accept().apply(ended))
+    assert mechanism_of(revert().apply(end(again))) == mechanism_of(own_state())
+    accepted = start_run().apply(accept().apply(ended))
     assert run_of(accepted).own.design == ended.design
 
 
 @pytest.mark.parametrize(
     "action",
     [
-        SetVariable("b2", 3.1),
+        set_variable("b2", 3.1),
         Set("design.unit_mm", 5.0),
         Set("design.limits", OPTIMAL.limits),
-        Open(OPTIMAL),
-        Reset(),
-        LiftLimit("box"),
+        open_design(OPTIMAL),
+        reset_design(),
+        lift_limit("box"),
     ],
 )
 def test_design_cannot_be_changed_while_a_run_goes_on(action: Action) -> None:
     state = start()
-    for each in (state, CancelRun().apply(state)):
+    for each in (state, cancel_run().apply(state)):
         with pytest.raises(InputError, match=r"being optimised: wait .* or cancel"):
             action.apply(each)
     action.apply(end(state))
@@ -396,22 +396,22 @@ def test_design_cannot_be_changed_while_a_run_goes_on(action: Action) -> None:
 def test_platform_moves_freely_during_a_run_and_iterates_keep_its_position() -> None:
     state = start(replace(SMALL, free=(*VARIABLES, YAW)))
     run = run_of(state)
-    moved = SetPosition(0, 6.0).apply(state)
+    moved = set_position(0, 6.0).apply(state)
     last = iterates_of(state, 3)[-1]
-    after = AddIterates(run.number, (last,)).apply(moved)
+    after = add_iterates(run.number, (last,)).apply(moved)
     assert after.pose.position[0] == 6.0
     assert after.pose.quaternion == last.design.home_pose.quaternion
     assert after.pose.quaternion != run.own.design.home_pose.quaternion
     assert after.joints == open_state(last.design, after.pose).joints
     # Iterates of another run change nothing.
-    assert AddIterates(run.number + 1, (last,)).apply(moved) == moved
+    assert add_iterates(run.number + 1, (last,)).apply(moved) == moved
 
 
 def test_opening_another_design_forgets_the_run_and_keeps_the_request() -> None:
-    after = Open(OPTIMAL).apply(end(start()))
+    after = open_design(OPTIMAL).apply(end(start()))
     assert Optimisation.of(after).run is None
     assert Optimisation.of(after).request == SMALL
-    assert run_of(StartRun().apply(after)).number == 2
+    assert run_of(start_run().apply(after)).number == 2
 
 
 # Problems, and what rules them out
@@ -441,7 +441,7 @@ def test_default_demands_can_be_kept_by_the_papers_designs(design: Design, objec
     state = ask(OptimisationRequest(objective=objective), open_state(design))
     assert find_refusals(state) == ()
     assert liftable_limits(state) == ()
-    assert StartRun().apply(state).busy
+    assert start_run().apply(state).busy
 
 
 @pytest.mark.parametrize(
@@ -476,8 +476,8 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     assert filled_buttons(before) == [LIFT]
     assert buttons_of(before)[START] == "disabled"
     assert f">{title}<" in search_words(before)
-    assert LiftLimit(limit).title == title
-    after = LiftLimit(limit).apply(before)
+    assert lift_limit(limit).describe(before) == title
+    after = lift_limit(limit).apply(before)
     assert limit not in {refusal.limit for refusal in find_refusals(after)}
     assert after.design.home_pose == design.home_pose
 
@@ -501,7 +501,7 @@ def test_words_of_a_search_are_in_the_unit_of_the_page(found: State) -> None:
 
 def test_verdict_is_gone_with_the_design_that_it_is_about(found: State) -> None:
     assert "Converged" in search_words(found)
-    after = SetVariable("b2", 3.3).apply(found)
+    after = set_variable("b2", 3.3).apply(found)
     assert "Converged" not in search_words(after)
     assert "changed by hand" in search_words(after)
 
@@ -579,12 +579,12 @@ def test_charts_are_of_one_start_and_of_the_demands() -> None:
     iterates = iterates_of(state, 8)
     assert {each.run for each in iterates} == {0, 1}
     last = [each for each in iterates if each.run == 1]
-    drawn = charted_iterates(run_of(AddIterates(run.number, iterates).apply(state)))
+    drawn = charted_iterates(run_of(add_iterates(run.number, iterates).apply(state)))
     reach, volume, spare = curves_of(run.problem, drawn)
     assert reach.values.tolist() == [each.objective for each in last]
     assert volume.values.tolist() == [each.volume for each in last]
     assert (volume.level, spare.level) == (7053.0, 0.0)
-    charts = "".join(course(run_of(AddIterates(run.number, iterates).apply(state)), state))
+    charts = "".join(course(run_of(add_iterates(run.number, iterates).apply(state)), state))
     assert charts.count('class="curve"') == charts.count("<svg") == 3
     assert charts.count('class="point"') == 3 * len(last)
     # An exact match is drawn as the least power.

@@ -25,7 +25,7 @@ from explorer.app.features.workspace.slice_map import AXES
 from explorer.app.features.workspace.work import draw_workspace
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetAngle, SetPosition
+from explorer.app.state.moves import set_angle, set_position
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import WorkspaceView
 from explorer.errors import InputError
@@ -80,14 +80,14 @@ def services_and_worker() -> tuple[Services, StubJobs]:
 def test_angles_that_are_set_are_those_of_the_pose() -> None:
     state = open_state(OPTIMAL)
     for axis, value in ((1, 25.0), (0, -140.0), (2, -50.0)):
-        state = work.SetTiltTorsion(axis, value).apply(state)
+        state = work.set_tilt_torsion(axis, value).apply(state)
         assert tilt_torsion_of(state.pose.rotation)[axis] == pytest.approx(value, abs=1e-9)
     assert tilt_torsion_of(state.pose.rotation) == pytest.approx((-140.0, 25.0, -50.0), abs=1e-9)
     assert state.pose.position == OPTIMAL.home_pose.position
-    there = work.GoToTilt(30.0, 20.0).apply(state)
+    there = work.go_to_tilt(30.0, 20.0).apply(state)
     assert tilt_torsion_of(there.pose.rotation) == pytest.approx((30.0, 20.0, -50.0), abs=1e-9)
-    assert work.SetTiltTorsion(1, 25.0).words() == "tilt = 25°"
-    assert work.GoToTilt(30.0, 20.0).describe(there) == "Tilt 20° towards 30°"
+    assert work.set_tilt_torsion(1, 25.0).describe(state) == "tilt = 25°"
+    assert work.go_to_tilt(30.0, 20.0).describe(there) == "Tilt 20° towards 30°"
 
 
 @pytest.mark.parametrize("azimuth", [-150.0, 20.0, 100.0])
@@ -97,7 +97,7 @@ def test_tilt_beyond_the_map_goes_to_its_border_in_the_same_mode_and_says_why(
     state = open_state(OPTIMAL)
     border = tilt_map(OPTIMAL, state.position, state.tilt_torsion.torsion, [azimuth])
     most, limit = float(border.tilts[0]), border.limits[0]
-    beyond = work.GoToTilt(azimuth, 170.0)
+    beyond = work.go_to_tilt(azimuth, 170.0)
     after = beyond.apply(state)
     assert after.tilt_torsion.tilt == pytest.approx(most - work.INSIDE)
     assert after.mode == state.mode
@@ -107,9 +107,9 @@ def test_tilt_beyond_the_map_goes_to_its_border_in_the_same_mode_and_says_why(
     assert f"{most:.1f}°, by {limit}" in after.remark
     assert f"Tilt {most - work.INSIDE:.4g}°" in beyond.describe(after)
     # No tilt is reached from one that is beyond a limit itself.
-    outside = SetPosition(0, 30.0).apply(state)
+    outside = set_position(0, 30.0).apply(state)
     with pytest.raises(InputError, match="no tilt is possible here"):
-        work.GoToTilt(azimuth, 5.0).apply(outside)
+        work.go_to_tilt(azimuth, 5.0).apply(outside)
 
 
 def test_map_draws_each_tilt_at_its_place_in_the_colour_of_its_limit() -> None:
@@ -190,16 +190,16 @@ def test_best_torsion_is_told_beside_the_present_one(by_torsion: TiltByTorsion) 
 def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> None:
     state = open_state(OPTIMAL)
     for axis, value in ((0, 60.0), (1, 20.0), (2, -50.0)):
-        state = work.SetTiltTorsion(axis, value).apply(state)
+        state = work.set_tilt_torsion(axis, value).apply(state)
     for tilt in (0.0, 180.0):
-        at_end = work.SetTiltTorsion(1, tilt).apply(state)
+        at_end = work.set_tilt_torsion(1, tilt).apply(state)
         assert at_end.tilt_torsion == (60.0, tilt, -50.0)
-        back = work.SetTiltTorsion(1, 20.0).apply(SetPosition(2, 8.0).apply(at_end))
+        back = work.set_tilt_torsion(1, 20.0).apply(set_position(2, 8.0).apply(at_end))
         assert tilt_torsion_of(back.pose.rotation) == pytest.approx((60.0, 20.0, -50.0), abs=1e-9)
-        clicked = work.GoToTilt(30.0, 20.0).apply(at_end)
+        clicked = work.go_to_tilt(30.0, 20.0).apply(at_end)
         assert clicked.tilt_torsion == (30.0, 20.0, -50.0)
     # Another rotation has angles of its own.
-    turned = SetAngle(0, 10.0).apply(work.SetTiltTorsion(1, 0.0).apply(state))
+    turned = set_angle(0, 10.0).apply(work.set_tilt_torsion(1, 0.0).apply(state))
     assert turned.tilt_torsion == pytest.approx((0.0, 0.0, 10.0), abs=1e-9)
 
 
@@ -216,7 +216,7 @@ def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure
     feed.follow(Frame(state))
     jobs.work()
     assert "is-outdated" not in text_at(state)
-    after = SetPosition(2, 12.0).apply(state)
+    after = set_position(2, 12.0).apply(state)
     feed.follow(Frame(after))
     assert text_at(after).count("is-outdated") == 2
     jobs.orders[-1].failed("the jobs ended")

@@ -26,12 +26,12 @@ from explorer.app.features.feature import Services
 from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.paths.actions import (
-    AdvanceJourney,
-    Go,
-    Play,
     SetLaw,
-    SetPathTime,
-    TakePlan,
+    advance_journey,
+    go,
+    play,
+    set_path_time,
+    take_plan,
 )
 from explorer.app.features.paths.editor import MODES, PRESENT, TYPED, numbers_of
 from explorer.app.features.paths.feature import DIED, PathRunner, PathScene, path_chip
@@ -74,8 +74,8 @@ from explorer.app.features.paths.work import DrivesRequest, draw_drives, request
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
-from explorer.app.state.moves import SetPose, SetPosition
+from explorer.app.state.geometry import set_variable
+from explorer.app.state.moves import set_pose, set_position
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.errors import InputError
@@ -140,7 +140,7 @@ def goal_of(state: State) -> StopAt:
 
 
 def start_between(first: int, last: int, pose: Pose = TILTED) -> State:
-    return Go().apply(with_ends(open_state(OPTIMAL, pose), first, last))
+    return go().apply(with_ends(open_state(OPTIMAL, pose), first, last))
 
 
 def path_of(state: State) -> Journey:
@@ -171,7 +171,7 @@ def test_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
     assert state.pose == journey.poses[0]
     assert state.mode == first
     assert journey.is_playing
-    end = SetPathTime(journey.trajectory.duration).apply(state)
+    end = set_path_time(journey.trajectory.duration).apply(state)
     assert end.pose == journey.poses[-1]
     assert end.mode == last
     assert end.joints == pytest.approx(joints, abs=1e-9)
@@ -186,7 +186,7 @@ def test_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
 def test_straight_path_leads_between_any_two_ends(start: StopAt, goal: StopAt) -> None:
     before = with_ends(open_state(OPTIMAL, TILTED), start, goal)
     expected = poses_of(before)
-    state = Go().apply(before)
+    state = go().apply(before)
     journey = path_of(state)
     assert (journey.kind, journey.poses) == ("straight", expected)
     assert journey.poses[0] == (TILTED if start is None else expected[0])
@@ -199,7 +199,7 @@ def test_straight_path_leads_between_any_two_ends(start: StopAt, goal: StopAt) -
 def test_goal_is_the_neighbouring_mode_until_one_is_chosen_and_stays_once_it_is_gone_to() -> None:
     state = open_state(OPTIMAL)
     assert (state.mode, goal_of(state)) == (1, 5)
-    end = SetPathTime(WATCH_SECONDS).apply(Go().apply(state))
+    end = set_path_time(WATCH_SECONDS).apply(go().apply(state))
     assert (end.mode, Paths.of(end).stops[1].at, goal_of(end)) == (5, 5, 5)
 
 
@@ -210,7 +210,7 @@ def test_path_from_a_pose_to_itself_is_refused(start: StopAt, goal: StopAt) -> N
     state = with_ends(open_state(OPTIMAL, TILTED), start, goal)
     for kind in ("straight", "planned"):
         with pytest.raises(InputError, match="are the same pose: choose another goal"):
-            Go().apply(Set("paths.kind", kind).apply(state))
+            go().apply(Set("paths.kind", kind).apply(state))
 
 
 def test_path_between_poses_that_differ_by_rounding_is_refused() -> None:
@@ -218,36 +218,36 @@ def test_path_between_poses_that_differ_by_rounding_is_refused() -> None:
     x, y, z = state.pose.position
     nearby = Pose((x + 1e-7, y, z), state.pose.quaternion)
     with pytest.raises(InputError, match="are the same pose"):
-        Go().apply(with_ends(state, None, nearby))
+        go().apply(with_ends(state, None, nearby))
     with pytest.raises(InputError, match="the path has no length"):
         Journey("planned", "Path", OPTIMAL, (state.pose, nearby))
 
 
 def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
-    state = SetPathTime(0.3 * WATCH_SECONDS).apply(start_between(1, 4))
-    again = Go().apply(state)
+    state = set_path_time(0.3 * WATCH_SECONDS).apply(start_between(1, 4))
+    again = go().apply(state)
     for pose, before in zip(path_of(again).poses, path_of(state).poses, strict=True):
         np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
     # But elsewhere those of the present pose.
-    elsewhere = Go().apply(SetPosition(0, 9.0).apply(state))
+    elsewhere = go().apply(set_position(0, 9.0).apply(state))
     assert path_of(elsewhere).poses[0] != path_of(state).poses[0]
     # A path whose ends have other leg lengths gives its own place no other legs.
-    free = SetPathTime(4.0).apply(Go().apply(with_ends(open_state(OPTIMAL, TILTED), None, GOAL)))
+    free = set_path_time(4.0).apply(go().apply(with_ends(open_state(OPTIMAL, TILTED), None, GOAL)))
     modes = forward(OPTIMAL, joints_of(OPTIMAL, free.pose))
     assert poses_of(with_ends(free, None, 6))[1].position == pytest.approx(modes.position[6])
 
 
 def test_path_is_of_its_design() -> None:
     state = start_between(1, 5)
-    other = SetVariable("b2", 2.7).apply(state)
+    other = set_variable("b2", 2.7).apply(state)
     assert journey_of(other) is None
     heavier = Set("design.payload.mass_kg", 2.0).apply(state)
     assert path_of(heavier) == replace(path_of(state), design=heavier.design)
-    for action in (SetPathTime(1.0), Play(True)):
+    for action in (set_path_time(1.0), play(True)):
         with pytest.raises(InputError, match="no path for this design"):
             action.apply(other)
-    assert AdvanceJourney(1.0).apply(other) is other
-    assert journey_of(SetVariable("b2", OPTIMAL.b2).apply(other)) == path_of(state)
+    assert advance_journey(1.0).apply(other) is other
+    assert journey_of(set_variable("b2", OPTIMAL.b2).apply(other)) == path_of(state)
 
 
 # Playing
@@ -258,30 +258,30 @@ def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
     duration = path_of(state).trajectory.duration
     assert duration == pytest.approx(WATCH_SECONDS)
     for _ in range(4):
-        state = AdvanceJourney(0.3 * duration).apply(state)
+        state = advance_journey(0.3 * duration).apply(state)
         assert state.pose == path_of(state).pose
     assert (path_of(state).at, path_of(state).is_playing) == (duration, False)
-    assert AdvanceJourney(1.0).apply(state) is state
-    again = Play(True).apply(state)
+    assert advance_journey(1.0).apply(state) is state
+    again = play(True).apply(state)
     assert (path_of(again).at, path_of(again).is_playing) == (0.0, True)
-    paused = Play(False).apply(AdvanceJourney(1.0).apply(again))
+    paused = play(False).apply(advance_journey(1.0).apply(again))
     assert (path_of(paused).at, path_of(paused).is_playing) == (1.0, False)
-    assert path_of(SetPathTime(1e9).apply(paused)).at == duration
-    assert path_of(SetPathTime(-1.0).apply(paused)).at == 0.0
+    assert path_of(set_path_time(1e9).apply(paused)).at == duration
+    assert path_of(set_path_time(-1.0).apply(paused)).at == 0.0
     with pytest.raises(InputError, match="finite"):
-        SetPathTime(float("nan")).apply(paused)
+        set_path_time(float("nan")).apply(paused)
 
 
 def test_runner_plays_in_real_time_until_it_is_paused(bench: Bench) -> None:
     began = time.monotonic()
-    bench.do(Go())
+    bench.do(go())
     state = bench.wait(
         lambda state: Paths.of(state).journey is not None and path_of(state).at > 0.1
     )
     assert path_of(state).at <= time.monotonic() - began
-    bench.do(Play(False))
+    bench.do(play(False))
     paused = bench.state
-    assert AdvanceJourney(1.0).apply(paused) is paused
+    assert advance_journey(1.0).apply(paused) is paused
     assert bench.times == sorted(bench.times)
 
 
@@ -294,7 +294,7 @@ def margins_of(pose: Pose) -> FloatArray:
 
 @pytest.mark.parametrize(("first", "last"), [(0, 7), (1, 4), (1, 5)])
 def test_chart_shows_margins_of_the_poses_over_time(first: int, last: int) -> None:
-    journey = path_of(SetPathTime(3.0).apply(start_between(first, last)))
+    journey = path_of(set_path_time(3.0).apply(start_between(first, last)))
     times, shown, singular = margins_over(journey, UNITS)
     assert (np.diff(times) >= 0.0).all()
     crossings = journey.margins.crossings
@@ -342,7 +342,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     bench: Bench,
 ) -> None:
     bench.do(Set("design.limits", with_radius(OPTIMAL, 0.2).limits))
-    bench.do(Set("paths.stops", (Stop(), Stop(GOAL))), Set("paths.kind", "planned"), Go())
+    bench.do(Set("paths.stops", (Stop(), Stop(GOAL))), Set("paths.kind", "planned"), go())
     state = bench.wait_for_plan(1)
     assert Paths.of(state).problem is None
     journey = path_of(state)
@@ -361,7 +361,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     assert process != os.getpid()
     # A plan that would never be ready.
     os.kill(process, signal.SIGSTOP)
-    bench.do(SetPose(open_state(OPTIMAL).pose), Go())
+    bench.do(set_pose(open_state(OPTIMAL).pose), go())
     assert "Planning, for 2 s at most" in str(
         plan_words(bench.wait(lambda s: Paths.of(s).is_planning))
     )
@@ -372,22 +372,22 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     # Cancelled before it was begun, it leaves the process.
     with suppress(ProcessLookupError):
         os.kill(process, signal.SIGCONT)
-    bench.do(Go())
+    bench.do(go())
     assert path_of(bench.wait_for_plan(3)).poses[-1] == GOAL
     assert bench.complaints == bench.reports == []
 
 
 def test_plan_that_comes_late_or_for_another_design_is_not_taken() -> None:
-    state = Go().apply(to_plan())
+    state = go().apply(to_plan())
     journey = Journey("planned", "", OPTIMAL, (open_state(OPTIMAL).pose, GOAL))
-    for late in (CANCEL.apply(state), Go().apply(state)):
-        assert TakePlan(1, journey, None).apply(late) == late
-    assert TakePlan(1, journey, None).apply(state).pose == journey.poses[0]
-    changed = SetVariable("b2", 2.7).apply(state)
-    after = TakePlan(1, journey, None).apply(changed)
+    for late in (CANCEL.apply(state), go().apply(state)):
+        assert take_plan(1, journey, None).apply(late) == late
+    assert take_plan(1, journey, None).apply(state).pose == journey.poses[0]
+    changed = set_variable("b2", 2.7).apply(state)
+    after = take_plan(1, journey, None).apply(changed)
     assert after.pose == changed.pose
     assert "design has changed" in str(Paths.of(after).problem)
-    failed = TakePlan(1, None, DIED).apply(state)
+    failed = take_plan(1, None, DIED).apply(state)
     assert Paths.of(failed).problem == DIED
 
 
@@ -451,7 +451,7 @@ def test_pose_is_the_present_one_a_mode_or_six_numbers(
     services: Services, desk: Desk, index: int
 ) -> None:
     paths = PathsPanel(services)
-    desk.session.do(SetPose(TILTED))
+    desk.session.do(set_pose(TILTED))
     desk.session.do(Set("paths.stops", (Stop(), Stop(3))))
 
     def controls() -> dict[str, Any]:
@@ -488,7 +488,7 @@ def test_pose_is_the_present_one_a_mode_or_six_numbers(
     assert stops_of(desk.state)[index].pause == 0.3
     desk.use(controls()["Pose"], PRESENT)
     assert numbers() == TILTED
-    desk.session.do(SetPose(GOAL))
+    desk.session.do(set_pose(GOAL))
     # The first goes with the platform, another stays behind.
     assert numbers() == (TILTED if index else GOAL)
     desk.press(services.buttons, "paths.choose", str(index))
@@ -501,11 +501,11 @@ def test_poses_are_added_copied_moved_and_removed() -> None:
     # The first press keeps the present pose, the next ones add those of the platform.
     taught = add_present(state).apply(state)
     assert Paths.of(taught).stops == (Stop(TILTED),)
-    taught = SetPose(GOAL).apply(taught)
+    taught = set_pose(GOAL).apply(taught)
     taught = add_present(taught).apply(taught)
     assert poses_of(taught) == (TILTED, GOAL)
     # Behind the chosen one.
-    between = SetPosition(2, 8.0).apply(chosen(taught, 0))
+    between = set_position(2, 8.0).apply(chosen(taught, 0))
     between = add_present(between).apply(between)
     assert poses_of(between) == (TILTED, between.pose, GOAL)
     copied = copy_stop(between, 2).apply(between)
@@ -539,19 +539,19 @@ def test_closed_path_between_modes_is_told_with_its_singular_poses() -> None:
     state = with_ends(open_state(OPTIMAL, TILTED), 1, 5)
     closed = close_path(state)
     assert closed is not None
-    state = Go().apply(closed.apply(state))
+    state = go().apply(closed.apply(state))
     assert close_path(state) is None
     assert path_of(state).is_closed
     words = crossing_words(path_of(state), UNITS)
     assert "Closed path through modes 1 → 5 → 1. Singular 2 times: δ1 = 0" in words
     start = path_of(state).poses[0]
-    assert SetPathTime(1e9).apply(state).pose == start
+    assert set_path_time(1e9).apply(state).pose == start
     # Half way through, modes are still those of the legs at its poses.
-    on_the_way = SetPathTime(0.3 * WATCH_SECONDS).apply(state)
+    on_the_way = set_path_time(0.3 * WATCH_SECONDS).apply(state)
     again = zip(poses_of(on_the_way), path_of(state).poses, strict=True)
     for pose, before in again:
         np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
-    plain = crossing_words(path_of(Go().apply(with_ends(state, TILTED, GOAL))), UNITS)
+    plain = crossing_words(path_of(go().apply(with_ends(state, TILTED, GOAL))), UNITS)
     assert "Closed" not in plain
 
 
@@ -564,7 +564,7 @@ def test_poses_and_pauses_are_taken_from_a_table() -> None:
     assert [stop.pause for stop in stops_of(taken)] == [0.2, 0.0]
     assert poses_of(taken)[0].position == pytest.approx(expected.position)
     np.testing.assert_allclose(poses_of(taken)[0].rotation, expected.rotation, atol=1e-12)
-    assert path_of(Go().apply(taken)).pauses == (0.2, 0.0)
+    assert path_of(go().apply(taken)).pauses == (0.2, 0.0)
     for data, words in (
         (b"x,y\n1,2\n", "no column z"),
         (b"x,y,z\n" + 51 * b"1,2,3\n", "at most 50"),
@@ -599,7 +599,7 @@ def test_chosen_pose_has_the_handle_and_is_dragged_by_it(services: Services, des
     assert dragged.quaternion == TILTED.quaternion
     assert desk.state.pose == before
     # Once the path is made, the handle is that of the platform again.
-    desk.session.do(Go())
+    desk.session.do(go())
     assert place() == pytest.approx(scale * np.array(TILTED.position))
 
 
@@ -608,7 +608,7 @@ def test_pauses_of_a_planned_path_are_at_its_poses(services: Services) -> None:
     between = Pose.of_yaw_pitch_roll((12.0, 2.0, 8.0), (-73.0, 5.0, 0.0))
     stops = (Stop(None, 0.1), Stop(between, 0.2), Stop(GOAL, 0.3))
     state = Set("paths.stops", stops).apply(Set("paths.kind", "planned").apply(open_state(OPTIMAL)))
-    state, jobs = Go().apply(state), StubJobs()
+    state, jobs = go().apply(state), StubJobs()
     runner = PathRunner(services_for(jobs=jobs))
     runner.follow(Frame(state))
     (order,) = jobs.orders
@@ -658,7 +658,7 @@ def straight(*more: Action, force: Triple = DOWN) -> State:
         Set("paths.holds_load", True),
         Set("paths.seconds", 20.0),
         *more,
-        Go(),
+        go(),
     ):
         state = action.apply(state)
     return state
@@ -672,7 +672,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces() -> None:
         Set("view.prototype.density", 3000.0),
         force=(0.0, 0.0, -25.0),
     )
-    state = Go().apply(Set("paths.kind", "planned").apply(state))
+    state = go().apply(Set("paths.kind", "planned").apply(state))
     jobs = StubJobs()
     PathRunner(services_for(jobs=jobs)).follow(Frame(state))
     (order,) = jobs.orders
@@ -709,7 +709,7 @@ def drives_request(state: State) -> DrivesRequest:
 def test_drives_are_those_of_the_path_as_it_is_played_and_exported() -> None:
     state = with_ends(open_state(OPTIMAL), None, GOAL)
     assert request_for(state) is None
-    state = Go().apply(state)
+    state = go().apply(state)
     for law, seconds in (("watchable", WATCH_SECONDS), ("duration", 1.0)):
         state = SetLaw("paths.law", law).apply(state)
         design, path = drives_request(state)
@@ -724,7 +724,7 @@ def test_drives_are_those_of_the_path_as_it_is_played_and_exported() -> None:
 
 
 def test_change_of_the_law_keeps_the_place_on_the_path() -> None:
-    state = SetPathTime(3.0).apply(Go().apply(with_ends(open_state(OPTIMAL), None, GOAL)))
+    state = set_path_time(3.0).apply(go().apply(with_ends(open_state(OPTIMAL), None, GOAL)))
     before = path_of(state)
     fast = SetLaw("paths.law", "duration").apply(SetLaw("paths.duration", 0.5).apply(state))
     after = path_of(fast)
@@ -737,7 +737,7 @@ def test_change_of_the_law_keeps_the_place_on_the_path() -> None:
 
 
 def test_law_that_there_is_not_is_told_and_the_path_takes_a_time_to_watch() -> None:
-    state = Set("paths.law", "shortest").apply(Go().apply(with_ends(open_state(OPTIMAL), 1, 5)))
+    state = Set("paths.law", "shortest").apply(go().apply(with_ends(open_state(OPTIMAL), 1, 5)))
     assert path_of(state).trajectory.duration == pytest.approx(WATCH_SECONDS)
     assert "In the time asked for there is no law" in path_title(state, None)
     assert str(path_of(state).problem) in path_title(state, None)
@@ -750,18 +750,18 @@ def test_law_that_there_is_not_is_told_and_the_path_takes_a_time_to_watch() -> N
 
 
 def test_playback_is_slower_than_the_path_only_if_told() -> None:
-    state = Go().apply(with_ends(open_state(OPTIMAL), None, GOAL))
+    state = go().apply(with_ends(open_state(OPTIMAL), None, GOAL))
     assert "slower" not in path_chip(Frame(state)) + path_title(state, None)
-    assert path_of(AdvanceJourney(1.0).apply(state)).at == 1.0
+    assert path_of(advance_journey(1.0).apply(state)).at == 1.0
     slow = Set("paths.slower", 10.0).apply(state)
-    assert path_of(AdvanceJourney(1.0).apply(slow)).at == pytest.approx(0.1)
+    assert path_of(advance_journey(1.0).apply(slow)).at == pytest.approx(0.1)
     for words in (path_chip(Frame(slow)), path_title(slow, None)):
         assert "10 times slower" in words
 
 
 def test_drives_are_drawn_or_the_reason_is_told_in_a_sentence() -> None:
     html = drives_html(
-        draw_drives(drives_request(Go().apply(with_ends(open_state(OPTIMAL), None, GOAL))))
+        draw_drives(drives_request(go().apply(with_ends(open_state(OPTIMAL), None, GOAL))))
     )
     assert "One motor for all six needs at least" in html
     # A line of each actuator in the three charts over time and in that of force and speed.

@@ -41,10 +41,10 @@ from explorer.app.features.prototype.work import (
 )
 from explorer.app.features.sharing.feature import ExportDialog
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
-from explorer.app.state.moves import SetPose, SetPosition
+from explorer.app.state.geometry import set_variable
+from explorer.app.state.moves import set_pose, set_position
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.markup import status
@@ -91,7 +91,7 @@ def states(count: int, **changes: Any) -> list[State]:
     """Return the prototype in poses about home."""
     rng = np.random.default_rng(11)
     return [
-        SetPose(
+        set_pose(
             Pose.of_yaw_pitch_roll(
                 [10, 5, 9] + rng.uniform(-3, 3, 3), [-73, 0, 0] + rng.uniform(-15, 15, 3)
             )
@@ -149,9 +149,9 @@ def test_meshes_are_assigned_only_when_the_design_has_changed(
     assert meshes_assigned(with_prototype()) == 2 * PARTS
     for state in (*states(3), with_prototype(exploded=0.5), with_prototype(density=7850.0)):
         assert meshes_assigned(state) == 0
-    changed = SetVariable("b2", 2.7).apply(with_prototype())
+    changed = set_variable("b2", 2.7).apply(with_prototype())
     assert meshes_assigned(changed) > 0
-    assert meshes_assigned(SetPosition(0, 11.0).apply(changed)) == 0
+    assert meshes_assigned(set_position(0, 11.0).apply(changed)) == 0
 
 
 def test_parts_replace_bodies_and_legs_and_follow_their_switches(
@@ -248,7 +248,7 @@ def test_parts_are_made_again_when_the_design_changes_and_not_else(
     ):
         feed.follow(Frame(state))
     assert [order.task for order in orders] == [parts_drawing]
-    for state in (SetVariable("a3x", 19.0).apply(with_prototype()), thick(with_prototype(), 0.2)):
+    for state in (set_variable("a3x", 19.0).apply(with_prototype()), thick(with_prototype(), 0.2)):
         count = len(orders)
         feed.follow(Frame(state))
         assert len(orders) == count + 1
@@ -314,7 +314,7 @@ def test_verdict_is_the_same_everywhere_and_its_presses_mend_what_it_names(
 
     desk.session.do(Set("view.lengths", "mm"))
     carrying = msgspec.structs.replace(OPTIMAL, payload=Payload(1.0, (1.0, 2.0, 3.0)))
-    desk.session.do(Open(msgspec.structs.replace(carrying, unit_mm=unit)))
+    desk.session.do(open_design(msgspec.structs.replace(carrying, unit_mm=unit)))
     if unit != OPTIMAL.unit_mm:
         assert "Carriages 2 and 3 at home are 2.01 mm apart and need 2.6 mm." in show(desk.state)
         assert ">Set the unit to 3.89 mm<" in show(desk.state)
@@ -346,7 +346,7 @@ def test_parts_that_no_unit_mends_have_no_press_but_advice(services: Services) -
 
 
 def test_pose_beyond_the_joint_limits_of_the_parts_is_reported(feed: PartsFeed) -> None:
-    state = SetPosition(2, 17.0).apply(with_prototype())
+    state = set_position(2, 17.0).apply(with_prototype())
     feed.follow(Frame(state))
     parts = parts_to_draw(feed)
     assert parts is not None

@@ -30,7 +30,7 @@ from explorer.app.features.requirement.state import EXAMPLE, Required
 from explorer.app.features.requirement.work import CHECK_FEED
 from explorer.app.server import FIRST_DESIGN
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import set_unit
 from explorer.app.storage.library import Library
@@ -145,7 +145,7 @@ def test_zero_in_the_form_demands_nothing_and_numbers_are_millimetres_in_every_u
     form = Required.of(desk.state).form
     assert (form.legs.longest_mm, form.swing_deg, form.prefer) == (400.0, None, "easy-to-build")
     desk.session.do(lambda state: set_unit(state, 25.0))
-    desk.session.do(Open(FOUND))
+    desk.session.do(open_design(FOUND))
     assert Required.of(desk.state).form == form
     assert controls_of(services, panel, desk.state)["Longest (mm)"].value == 400.0
     desk.use(controls["Length ratio"], 1.0)

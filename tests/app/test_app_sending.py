@@ -14,7 +14,7 @@ from viser._messages import ReplayDoneMessage, RunJavascriptMessage, SceneNodeUp
 from viser.infra._messages import Message
 
 from explorer.app.server import Running
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.mechanism.design_file import PRESETS
 from explorer.page.browser.sending import Sending
 
@@ -127,7 +127,7 @@ def test_browser_shows_the_same_whenever_it_connects_and_without_what_is_hidden(
             await browsers[-1].read()
             for switch in random.permutation(SWITCHES)[:7]:
                 session.do(Set(f"view.{switch}", bool(random.integers(2))))
-            session.do(Open(PRESETS["paper-initial" if round_ % 2 else "paper-optimal"]))
+            session.do(open_design(PRESETS["paper-initial" if round_ % 2 else "paper-optimal"]))
             # Some of it comes while it is read.
             await browsers[0].read()
             assert server_clock.settle(running.page, 60.0)

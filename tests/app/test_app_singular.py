@@ -44,7 +44,7 @@ from explorer.app.scene.placing import Placed
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetMode, SetPosition
+from explorer.app.state.moves import set_mode, set_position
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import SingularView
 from explorer.app.widgets.blocks import render
@@ -65,7 +65,7 @@ BATCHED = ("batched_positions", "batched_scales")
 
 def singular_states() -> list[State]:
     """Return the home pose brought to each singular stratum."""
-    return [work.GoToStratum(w).apply(open_state(OPTIMAL)) for w in STRATA if w != GENERIC]
+    return [work.go_to_stratum(w).apply(open_state(OPTIMAL)) for w in STRATA if w != GENERIC]
 
 
 def viewed(state: State, **changes: Any) -> State:
@@ -83,7 +83,7 @@ def plain(html: str) -> str:
 @pytest.mark.parametrize("stratum", [w for w in STRATA if w != GENERIC])
 def test_stratum_is_reached_by_the_shortest_way(stratum: tuple[int, ...]) -> None:
     for state in random_states(2):
-        after = work.GoToStratum(stratum).apply(state)
+        after = work.go_to_stratum(stratum).apply(state)
         expected = nearest_in_stratum(OPTIMAL, state.pose, stratum)
         assert Frame(after).snapshot.stratum == stratum
         way = displacement(
@@ -98,7 +98,7 @@ def test_stratum_is_reached_by_the_shortest_way(stratum: tuple[int, ...]) -> Non
 
 @pytest.mark.parametrize("lower", [(2, 4, 3, 1), (1, 2, 3, 4)])
 def test_stratum_without_a_nearest_pose_is_refused(lower: tuple[int, ...]) -> None:
-    state = work.GoToStratum(lower).apply(open_state(OPTIMAL))
+    state = work.go_to_stratum(lower).apply(open_state(OPTIMAL))
     for goal, words in (
         (GENERIC, "arbitrarily close to every pose"),
         (lower, rf"lies in {re.escape(work.stratum_name(lower))} already"),
@@ -106,7 +106,7 @@ def test_stratum_without_a_nearest_pose_is_refused(lower: tuple[int, ...]) -> No
         ((1, 1, 2, 3), "permutation"),
     ):
         with pytest.raises(InputError, match=words):
-            work.GoToStratum(goal).apply(state)
+            work.go_to_stratum(goal).apply(state)
 
 
 def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
@@ -192,7 +192,7 @@ def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
     )
     assert not any(each["visible"] for each in drawn.values())
     with pytest.raises(InputError, match="δ2 = 0 already: lines a1a2 and b2b3 meeting"):
-        work.GoToSingularity(2).apply(viewed(work.GoToStratum((2, 1, 4, 3)).apply(desk.state)))
+        work.go_to_singularity(2).apply(viewed(work.go_to_stratum((2, 1, 4, 3)).apply(desk.state)))
 
 
 # Singular poses
@@ -233,7 +233,7 @@ def test_singular_pose_says_about_which_line_locked_actuators_let_the_platform_t
     incidence: int, line: str, through: str
 ) -> None:
     assert not list(freedoms(Frame(open_state(OPTIMAL)).snapshot))
-    frame = Frame(work.GoToSingularity(incidence).apply(random_states(1)[0]))
+    frame = Frame(work.go_to_singularity(incidence).apply(random_states(1)[0]))
     words = plain(render(freedoms(frame.snapshot), {f"show {incidence}": show_button(incidence)}))
     place, rotation = np.array(frame.state.pose.position), frame.state.pose.rotation
     found = re.fullmatch(
@@ -250,7 +250,7 @@ def test_singular_pose_says_about_which_line_locked_actuators_let_the_platform_t
 
 def test_pose_within_the_limits_looks_safe_unless_it_is_singular() -> None:
     regular = open_state(OPTIMAL)
-    singular = work.GoToSingularity(2).apply(regular)
+    singular = work.go_to_singularity(2).apply(regular)
     for state, kept in ((regular, "kept"), (singular, "kept, but singular")):
         frame = Frame(state)
         assert not frame.snapshot.violations
@@ -279,7 +279,7 @@ def still_clock() -> Generator[None]:
 def test_motion_swings_a_ghost_by_a_share_of_the_reach_and_leaves_the_state_alone(
     services: Services, desk: Desk
 ) -> None:
-    desk.session.do(work.GoToSingularity(2))
+    desk.session.do(work.go_to_singularity(2))
     motion, before, steps = FreeMotion(services), desk.state, desk.session.history
     frames: list[Frame] = []
 
@@ -324,7 +324,7 @@ def test_motion_swings_a_ghost_by_a_share_of_the_reach_and_leaves_the_state_alon
 
 @pytest.mark.usefixtures("still_clock")
 def test_motion_ends_once_the_platform_is_moved(services: Services, desk: Desk) -> None:
-    desk.session.do(work.GoToSingularity(3))
+    desk.session.do(work.go_to_singularity(3))
     motion = FreeMotion(services)
 
     def is_shown() -> bool:
@@ -334,7 +334,7 @@ def test_motion_ends_once_the_platform_is_moved(services: Services, desk: Desk) 
     assert not is_shown()
     desk.press(services.buttons, "singular.show", "3")
     assert is_shown()
-    desk.session.do(SetPosition(0, 9.0))
+    desk.session.do(set_position(0, 9.0))
     assert not is_shown()
     desk.session.do(UNDO)
     assert not is_shown()
@@ -358,7 +358,7 @@ def test_table_has_the_eight_modes_with_b4_and_the_limits_that_each_breaks() -> 
     assert [row[0] for row in rows] == [str(mode) for mode in range(8)]
     for mode, row in enumerate(rows):
         assert f"{row[0]}:  {row[1]}" == modes.MODES[mode]
-        there = Frame(SetMode(mode).apply(frame.state))
+        there = Frame(set_mode(mode).apply(frame.state))
         np.testing.assert_allclose(
             [number(cell) for cell in row[2:5]],
             OPTIMAL.unit_mm * np.array(there.state.pose.position),
@@ -387,7 +387,7 @@ def test_table_of_any_pose_has_eight_rows_with_numbers(case: Case) -> None:
 @pytest.mark.parametrize("x", [8.0, 9.0, 9.5, 10.0])
 def test_modes_that_meet_on_the_border_of_the_box_keep_the_same_limits(x: float) -> None:
     # Two modes of a pose on the base plane differ in the sign of z alone, where 0 is allowed.
-    frame = Frame(SetPosition(0, x).apply(SetPosition(2, 0.0).apply(open_state(OPTIMAL))))
+    frame = Frame(set_position(0, x).apply(set_position(2, 0.0).apply(open_state(OPTIMAL))))
     broken = [row[5] for row in rows_of_modes(frame)]
     assert broken[::2] == broken[1::2]
     assert broken[frame.state.mode] == "within"
@@ -426,7 +426,7 @@ def test_pointer_on_a_row_shows_one_ghost_with_its_number_and_leaves_no_step(
     assert sorted(visible()) == ["/ghosts/legs", "/ghosts/name/0", "/ghosts/platform/0"]
     scene = drawn()
     assert scene["/ghosts/name/0"]["text"] == modes.MODES[6]
-    there = SetMode(6).apply(before).pose
+    there = set_mode(6).apply(before).pose
     points = Configuration(OPTIMAL, there.position, there.rotation).points
     placed = Placed(Frame(desk.state))
     expected = placed.scale * np.array([points.b1, points.b2, points.b3, points.b4])

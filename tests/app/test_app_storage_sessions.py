@@ -16,13 +16,13 @@ from hypothesis import example, given, strategies as st
 from killed import run_until_killed
 from sample_states import OPTIMAL, Sample, rich_state, samples, states_of
 
-from explorer.app.features.optimise.actions import StartRun
+from explorer.app.features.optimise.actions import start_run
 from explorer.app.features.optimise.state import Optimisation, SearchRun
 from explorer.app.features.paths.state import Paths
 from explorer.app.session.history import History, HistoryStep, start_history
 from explorer.app.session.session import REDO, UNDO, Session
-from explorer.app.state.actions import SetName
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.actions import set_name
+from explorer.app.state.moves import set_position
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.storage import user_data
@@ -72,7 +72,7 @@ def moves(state: State, count: int) -> list[State]:
     """Return a state and those after moves along x."""
     states = [state]
     for number in range(count):
-        states.append(SetPosition(0, 5.0 + 0.01 * number).apply(states[-1]))
+        states.append(set_position(0, 5.0 + 0.01 * number).apply(states[-1]))
     return states
 
 
@@ -182,7 +182,7 @@ def saves_never(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def numbered(number: int) -> History:
     """Return a session that is known by a number: the first coordinate of b4."""
-    return start_history(SetPosition(0, float(number)).apply(OPENED))
+    return start_history(set_position(0, float(number)).apply(OPENED))
 
 
 def number_of(history: History | None) -> float | None:
@@ -452,13 +452,13 @@ def test_failed_save_is_tried_again_without_another_change(tmp_path: Path) -> No
 
 def test_resumed_session_is_undone_and_redone(desk: Desk, tmp_path: Path) -> None:
     saver = Autosaver(SessionFile(tmp_path), desk.complaints.append)
-    for action in (SetName("mine"), SetPosition(0, 12.0)):
+    for action in (set_name("mine"), set_position(0, 12.0)):
         desk.session.do(action)
         desk.session.latest_state()
         saver.follow(desk.session.history)
     # Until a search ends, the session before it is saved.
     before = desk.session.history
-    desk.session.do(StartRun())
+    desk.session.do(start_run())
     assert desk.state.busy
     saver.follow(desk.session.history)
     saver.stop()

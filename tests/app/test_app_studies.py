@@ -21,7 +21,7 @@ from services import StubJobs
 
 from explorer.app.features.feature import Services
 from explorer.app.features.studies import work
-from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
+from explorer.app.features.studies.actions import brush_axes, free_axes, open_study, pick_design
 from explorer.app.features.studies.feature import DECODER, PlotEvent, StudiesPanel
 from explorer.app.features.studies.feed import StudyDrawing, StudyFeed
 from explorer.app.features.studies.figures import (
@@ -61,7 +61,7 @@ from explorer.app.features.studies.work import StudyRunner
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
+from explorer.app.state.geometry import set_variable
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import open_state
 from explorer.app.widgets.buttons import Buttons
@@ -121,9 +121,9 @@ def test_row_is_within_brushes_if_each_of_them_has_it_in_some_range(
 def test_axis_has_the_ranges_that_it_was_given_last(
     strokes: list[tuple[str, tuple[tuple[float, float], ...]]],
 ) -> None:
-    state = OpenStudy("some").apply(open_state(OPTIMAL))
+    state = open_study("some").apply(open_state(OPTIMAL))
     for axis, each in strokes:
-        state = BrushAxes((Brush(axis, each),)).apply(state)
+        state = brush_axes((Brush(axis, each),)).apply(state)
     last = dict(strokes)
     assert {brush.axis: brush.ranges for brush in Studies.of(state).brushes} == {
         axis: each for axis, each in last.items() if each
@@ -131,7 +131,7 @@ def test_axis_has_the_ranges_that_it_was_given_last(
     assert all(Studies.of(state).ranges_of(axis) == each for axis, each in last.items())
     assert Studies.of(free_axes(state).apply(state)).brushes == ()
     # A box in the scatter plot brushes two axes at once.
-    every = BrushAxes(tuple(Brush(axis, each) for axis, each in strokes))
+    every = brush_axes(tuple(Brush(axis, each) for axis, each in strokes))
     assert Studies.of(every.apply(open_state(OPTIMAL))).brushes == Studies.of(state).brushes
 
 
@@ -142,15 +142,15 @@ def test_ranges_without_a_finite_interval_are_refused(
     wrong: tuple[tuple[float, float], ...],
 ) -> None:
     with pytest.raises(InputError):
-        BrushAxes((Brush("volume", wrong),)).apply(open_state(OPTIMAL))
+        brush_axes((Brush("volume", wrong),)).apply(open_state(OPTIMAL))
 
 
 def test_study_that_is_opened_has_no_brushes_unless_it_was_open() -> None:
-    state = OpenStudy("one").apply(open_state(OPTIMAL))
-    state = BrushAxes((Brush("volume", ((1.0, 2.0),)),)).apply(state)
+    state = open_study("one").apply(open_state(OPTIMAL))
+    state = brush_axes((Brush("volume", ((1.0, 2.0),)),)).apply(state)
     state = Set("studies.plan", QUICK).apply(state)
-    assert OpenStudy("one").apply(state) is state
-    other = OpenStudy("two").apply(state)
+    assert open_study("one").apply(state) is state
+    other = open_study("two").apply(state)
     assert Studies.of(other) == Studies(name="two", plan=QUICK)
 
 
@@ -514,17 +514,17 @@ def test_place_on_a_plot_has_the_nearest_design_and_the_axes_there(
 
 
 def test_picked_design_is_live_and_one_step_to_undo(desk: Desk, feed: StudyFeed) -> None:
-    desk.session.do(OpenStudy("some"))
+    desk.session.do(open_study("some"))
     drawing = draw_study(feed, Studies.of(desk.state))
     index = int(drawing.results.columns["index"][drawing.front[0]])
     design = drawing.results.design_at(index)
     before = desk.state
-    desk.session.do(PickDesign(design, index=index, study="some"))
+    desk.session.do(pick_design(design, index=index, study="some"))
     assert (desk.state.design, Studies.of(desk.state).picked) == (design, index)
     desk.session.do(UNDO)
     assert (desk.state.design, Studies.of(desk.state)) == (before.design, Studies.of(before))
-    desk.session.do(OpenStudy(None))
-    desk.session.do(PickDesign(design, index=index, study="some"))
+    desk.session.do(open_study(None))
+    desk.session.do(pick_design(design, index=index, study="some"))
     assert desk.state.design == before.design
     assert desk.complaints == ["the study 'some' is not open any more"]
 
@@ -535,7 +535,7 @@ def test_plots_are_not_drawn_again_for_a_live_design_and_a_lost_study_is_reporte
     studies = Studies(name="some")
     drawing = draw_study(feed, studies)
     state = with_value(open_state(OPTIMAL), "studies", studies)
-    feed.follow(Frame(SetVariable("b3", 5.0).apply(state)))
+    feed.follow(Frame(set_variable("b3", 5.0).apply(state)))
     feed.follow(Frame(Set("studies.plan", QUICK).apply(state)))
     assert feed.drawing is drawing
     feed.follow(Frame(with_value(open_state(OPTIMAL), "studies", Studies(name="gone"))))
@@ -755,7 +755,7 @@ def test_new_study_closes_the_open_one_and_shows_the_settings(
 ) -> None:
     services.shared[study_folders] = StudyFolders(home)
     panel = StudiesPanel(services)
-    desk.session.do(OpenStudy("some"))
+    desk.session.do(open_study("some"))
     # Without a request the settings of a new study are not shown while one is open.
     updates = [*panel.updates(Frame(desk.state))]
     assert [v for h, n, v in updates if h is panel.form and n == "visible"] == [False]

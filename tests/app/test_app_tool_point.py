@@ -21,7 +21,7 @@ from services import StubDownloads, StubJobs
 from strategies import Case, all_cases
 from workspace_feeds import draw
 
-from explorer.app.features.compare.feature import Pin
+from explorer.app.features.compare.feature import pin
 from explorer.app.features.compare.scene import SCENES
 from explorer.app.features.compare.state import CompareView
 from explorer.app.features.compare.work import FEEDS
@@ -30,8 +30,8 @@ from explorer.app.features.mechanism.feature import MovePanel
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.orientation.feature import OrientationPanel, OrientationScene
-from explorer.app.features.orientation.work import TILTS_FEED, SetTiltTorsion
-from explorer.app.features.paths.actions import Go
+from explorer.app.features.orientation.work import TILTS_FEED, set_tilt_torsion
+from explorer.app.features.paths.actions import go
 from explorer.app.features.paths.editor import TYPED, numbers_of
 from explorer.app.features.paths.feature import PathScene
 from explorer.app.features.paths.panel import PathsPanel
@@ -61,7 +61,7 @@ from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetAngle, SetMode, SetPose, SetPosition
+from explorer.app.state.moves import set_angle, set_mode, set_pose, set_position
 from explorer.app.state.state import State, angles_of, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.mechanism.configuration import Point
@@ -114,7 +114,7 @@ def test_coordinate_of_the_tool_is_set_alone_and_angles_turn_about_the_tool(
     drawn: tuple[State, float], axis: int, to: float, angle: float
 ) -> None:
     state, size = drawn
-    after = SetPosition(axis, to * size).apply(state)
+    after = set_position(axis, to * size).apply(state)
     expected = tool_of(state)
     expected[axis] = to * size
     np.testing.assert_allclose(tool_of(after), expected, rtol=0.0, atol=1e-14 * size)
@@ -122,9 +122,9 @@ def test_coordinate_of_the_tool_is_set_alone_and_angles_turn_about_the_tool(
     assert after.yaw_pitch_roll == state.yaw_pitch_roll
     others = [i for i in range(3) if i != axis]
     assert [after.pose.position[i] for i in others] == [state.pose.position[i] for i in others]
-    by_angle = SetAngle(axis, angle).apply(state)
+    by_angle = set_angle(axis, angle).apply(state)
     assert by_angle.yaw_pitch_roll[axis] == angle
-    by_tilt = SetTiltTorsion(axis, angle).apply(state)
+    by_tilt = set_tilt_torsion(axis, angle).apply(state)
     assert by_tilt.tilt_torsion[axis] == angle
     for after in (by_angle, by_tilt):
         np.testing.assert_allclose(tool_of(after), tool_of(state), rtol=0.0, atol=1e-14 * size)
@@ -184,7 +184,7 @@ def test_words_and_numbers_are_those_of_the_point() -> None:
     rows = re.findall(r"<button[^>]*modes\.go.*?</button>", modes_table(Frame(state), ""))
     for mode, row in enumerate(rows):
         cells = re.findall(r"<span(?: [^>]*)?>([^<]*)", row)
-        there = tool_of(SetMode(mode).apply(state))
+        there = tool_of(set_mode(mode).apply(state))
         np.testing.assert_allclose([number(cell) for cell in cells[1:4]], there, atol=0.06)
     caption = caption_of(state, dt.date(2026, 1, 1)).partition("the tool at (")[2]
     numbers = re.sub("<.*?>", "", numbers_of(state, None))
@@ -210,7 +210,7 @@ def test_handle_is_at_the_tool_moves_it_and_turns_about_it(services: Services, d
         ((8.0, 3.0, 9.5), TILTED.quaternion),
     ):
         handle.handle.position, handle.handle.wxyz = place, quaternion
-        desk.session.do(SetPose(handle.pose(desk.state)))
+        desk.session.do(set_pose(handle.pose(desk.state)))
         np.testing.assert_allclose(scale * tool_of(desk.state), place, atol=1e-12)
         assert desk.state.pose.quaternion == quaternion
         written = by_name(handle.updates(Placed(Frame(desk.state))))["/handle"]
@@ -249,7 +249,7 @@ def test_ball_is_about_the_tool_and_touches_where_the_tool_is_singular(
     centre, touch = (np.array(drawn[f"/ball/{name}"]["position"]) for name in ("ball", "touch"))
     np.testing.assert_allclose(centre, placed.scale * tool_of(state), atol=1e-12)
     x, y, z = (touch / placed.scale).tolist()
-    there = SetPose(state.pose_at((x, y, z), state.pose)).apply(state)
+    there = set_pose(state.pose_at((x, y, z), state.pose)).apply(state)
     incidence = placed.frame.free_ball.incidence
     assert abs(Frame(there).snapshot.margins[incidence - 1]) < 1e-9
     np.testing.assert_allclose(
@@ -262,7 +262,7 @@ def test_ball_is_about_the_tool_and_touches_where_the_tool_is_singular(
 
 def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
     state = state_at(pose=None)
-    state = Go().apply(Set("paths.stops", (Stop(), Stop(TILTED))).apply(state))
+    state = go().apply(Set("paths.stops", (Stop(), Stop(TILTED))).apply(state))
     journey = journey_of(state)
     assert journey is not None
     placed = Placed(Frame(state))
@@ -321,7 +321,7 @@ def test_undo_leads_back_to_the_point_of_each_step_and_leaves_the_rest_of_the_vi
     for action in (
         Set("design", with_tool(OPTIMAL)),
         Set("view.at", "tool"),
-        SetPosition(0, 9.0),
+        set_position(0, 9.0),
         Set("view.grid", False),
         Set("view.at", "b4"),
     ):
@@ -431,7 +431,7 @@ def test_click_on_the_map_puts_the_point_there_in_one_step(
     for action in (
         Set("design", with_tool(OPTIMAL)),
         Set("view.at", at),
-        SetAngle(1, 15.0),
+        set_angle(1, 15.0),
         Set("view.workspace.orientation", orientation),
     ):
         desk.session.do(action)
@@ -512,7 +512,7 @@ def test_nodes_of_tilts_are_where_the_tool_is_at_tilt_zero(services: Services) -
         drawn = by_name(scene.updates(Placed(Frame(state))))["/orientation/tilts"]["points"]
         return np.asarray(drawn, dtype=np.float64) / scale
 
-    upright = SetTiltTorsion(1, 0.0).apply(state)
+    upright = set_tilt_torsion(1, 0.0).apply(state)
     tools = nodes(state)
     assert len(tools) == len(drawing.positions)
     for index in range(0, len(tools), len(tools) // 40):
@@ -541,8 +541,8 @@ def test_tab_of_tilts_has_the_largest_tilt_about_the_tool(services: Services) ->
     assert largest_tilt(Set("view.at", "b4").apply(state)) != text
     inside, beyond = (
         [
-            Frame(SetTiltTorsion(1, float(text) + change).apply(towards)).snapshot.violations
-            for towards in (SetTiltTorsion(0, each).apply(state) for each in range(-180, 180, 4))
+            Frame(set_tilt_torsion(1, float(text) + change).apply(towards)).snapshot.violations
+            for towards in (set_tilt_torsion(0, each).apply(state) for each in range(-180, 180, 4))
         ]
         for change in (-0.1, 0.1)
     )
@@ -558,7 +558,7 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
     other = msgspec.structs.replace(initial, unit_mm=20.0)
     for at in ("b4", "tool"):
         state = Set("compared.look", CompareView(overlay=True)).apply(
-            Pin(other).apply(state_at(at))
+            pin(other).apply(state_at(at))
         )
         for feed in FEEDS:
             services.get(feed).follow(Frame(state))

@@ -20,7 +20,7 @@ from explorer.app.features.singularity.feature import (
     neighbours,
     summary,
 )
-from explorer.app.features.singularity.work import STRATA_FEED, GoToSingularity
+from explorer.app.features.singularity.work import STRATA_FEED, go_to_singularity
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
@@ -61,7 +61,7 @@ def test_verdict_seven_degrees_from_an_incidence_is_near_and_so_is_its_margin() 
 
 @pytest.mark.parametrize("incidence", [1, 2, 3])
 def test_nearest_singular_pose_is_the_boundary_of_two_modes(incidence: int) -> None:
-    frame = Frame(GoToSingularity(incidence).apply(open_state(OPTIMAL)))
+    frame = Frame(go_to_singularity(incidence).apply(open_state(OPTIMAL)))
     found = frame.verdict
     assert (found.kind, found.incidences, found.distance) == ("singular", (incidence,), 0.0)
     assert found.levels[incidence - 1] == 0.0
@@ -194,7 +194,7 @@ def test_modes_that_meet_in_a_pose_differ_in_the_signs_that_vanish(case: Case) -
 
 
 def test_distances_of_deeper_strata_are_shown_at_a_singular_pose_without_the_diagram() -> None:
-    singular = GoToSingularity(2).apply(open_state(OPTIMAL))
+    singular = go_to_singularity(2).apply(open_state(OPTIMAL))
     frame = Frame(Set("view.singular.strata", value=False).apply(singular))
     jobs = StubJobs(at_once=True)
     feed = STRATA_FEED(services_for(jobs=jobs))

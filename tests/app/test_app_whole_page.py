@@ -16,13 +16,13 @@ from page_props import shown_by, shown_texts
 from sample_states import Sample, samples
 from server_clock import wait_until_drawn
 
-from explorer.app.features.compare.feature import Pin
-from explorer.app.features.optimise.actions import Accept, StartRun
+from explorer.app.features.compare.feature import pin
+from explorer.app.features.optimise.actions import accept, start_run
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest
 from explorer.app.features.paths.state import Paths
 from explorer.app.server import Running
-from explorer.app.state.actions import Action, Open, Set
-from explorer.app.state.moves import GoHome, SetAngle, SetPose, SetPosition
+from explorer.app.state.actions import Action, Set, open_design
+from explorer.app.state.moves import go_home, set_angle, set_pose, set_position
 from explorer.app.state.state import State
 from explorer.app.state.view import View
 from explorer.errors import ExplorerError
@@ -50,7 +50,7 @@ def running() -> Generator[Running]:
 
 @pytest.fixture(autouse=True)
 def _at_first(running: Running) -> None:  # pyright: ignore[reportUnusedFunction]
-    running.page.session.do(Open(PRESETS["paper-optimal"]))
+    running.page.session.do(open_design(PRESETS["paper-optimal"]))
     running.page.session.do(Set("view", View()))
     assert wait_until_drawn(running.page, PATIENCE_SECONDS)
 
@@ -86,11 +86,11 @@ def test_numbers_of_all_texts_are_written_alike_after_random_actions(
 def test_rounding_is_zero_in_all_texts(
     running: Running, position: Triple, angles: Triple, axis: str
 ) -> None:
-    do(running, SetPose(Pose.of_yaw_pitch_roll(position, angles)))
+    do(running, set_pose(Pose.of_yaw_pitch_roll(position, angles)))
     check_numbers(running)
-    do(running, GoHome())
-    do(running, SetPosition("xyz".index(axis), position[0]))
-    do(running, SetAngle("xyz".index(axis), angles[0]))
+    do(running, go_home())
+    do(running, set_position("xyz".index(axis), position[0]))
+    do(running, set_angle("xyz".index(axis), angles[0]))
     check_numbers(running)
 
 
@@ -155,14 +155,14 @@ def test_name_has_one_value_after_an_optimum_and_after_a_turn(running: Running) 
     page, session = running.page, running.page.session
     request = OptimisationRequest(objective="smallest-reach", volume=7053.0)
     session.do(Set("optimisation.request", request))
-    session.do(StartRun())
+    session.do(start_run())
     wait_for(lambda: is_compared(session.state))
     for action in (
-        Accept(),
-        Pin(PRESETS["paper-initial"]),
+        accept(),
+        pin(PRESETS["paper-initial"]),
         Set("view.workspace.solid", True),
         Set("view.drawn_as", "prototype"),
-        SetPosition(0, 9.0),
+        set_position(0, 9.0),
     ):
         session.do(action)
     for turn, orientation, region in (
@@ -171,7 +171,7 @@ def test_name_has_one_value_after_an_optimum_and_after_a_turn(running: Running) 
         (0.0, "pose", "limits"),
         (0.0, "pose", "accessible"),
     ):
-        session.do(SetAngle(0, session.state.yaw_pitch_roll[0] + turn))
+        session.do(set_angle(0, session.state.yaw_pitch_roll[0] + turn))
         session.do(Set("view.workspace.orientation", orientation))
         session.do(Set("view.workspace.region", region))
         assert wait_until_drawn(page, PATIENCE_SECONDS)

@@ -28,10 +28,10 @@ from explorer.app.features.workspace.slice_map import map_picture
 from explorer.app.features.workspace.words import drawing_words, volume_headline, volume_text
 from explorer.app.features.workspace.work import STEP, Selection, WorkspaceDrawing, export_mesh
 from explorer.app.scene.surfaces import AT_LIMIT, PLAIN
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.geometry import set_variable
+from explorer.app.state.moves import set_position
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView
 from explorer.errors import InputError
@@ -73,7 +73,7 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
     feed = services.get(feeds.VOLUME_FEED)
     assert volume_text(feed.drawing, UNITS) == "–"
     assert "Computing" in volume_headline(Frame(first), feed)
-    for state in (first, SetVariable("a3x", 17.0).apply(first)):
+    for state in (first, set_variable("a3x", 17.0).apply(first)):
         feed.follow(Frame(state))
         assert not feed.is_current
         follow(services, state)
@@ -91,7 +91,7 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
 def test_volume_is_requested_before_the_drawing_and_once_only() -> None:
     services, state = services_for(), with_workspace(open_state(OPTIMAL), solid=True)
     # Neither another position nor another colour changes it.
-    for other in (state, SetPosition(2, 8.0).apply(state), with_workspace(state, colour="margin")):
+    for other in (state, set_position(2, 8.0).apply(state), with_workspace(state, colour="margin")):
         worker = follow(services, other)
     tasks = [order.task.__name__ for order in worker.orders]
     assert tasks == ["measure_volume", "draw_workspace", "draw_workspace"]
@@ -159,7 +159,7 @@ def test_cut_shows_the_solid_and_goes_through_its_middle_on_every_axis(
 
 def test_slider_of_the_cut_spans_the_extent_and_follows_the_design(services: Services) -> None:
     state = with_workspace(open_state(OPTIMAL), solid=True, cut="y")
-    for changed in (state, SetVariable("a3x", 14.0).apply(state)):
+    for changed in (state, set_variable("a3x", 14.0).apply(state)):
         follow(services, changed)
         extent = drawing_of(changed).extent
         assert extent is not None
@@ -538,7 +538,7 @@ def test_payload_without_a_weight_loads_nothing_but_its_force() -> None:
 def test_colour_that_a_design_states_nothing_of_asks_for_what_it_needs(
     services: Services, desk: Desk, colour: str, words: str
 ) -> None:
-    desk.session.do(Open(OPTIMAL))
+    desk.session.do(open_design(OPTIMAL))
     desk.session.do(Set("view", load_state(OPTIMAL, colour=colour).view))
     panel = WorkspacePanel(services)
     request = feeds.workspace_request(Frame(desk.state))

@@ -25,7 +25,7 @@ from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
+from explorer.app.state.geometry import set_variable
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import WorkspaceView
 from explorer.jobs.jobs import Jobs
@@ -86,7 +86,7 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     assert feed.drawing is None
     state = with_solid(open_state(OPTIMAL))
     for i in range(25):
-        state = SetVariable("a3x", 18.0 + 0.05 * i).apply(state)
+        state = set_variable("a3x", 18.0 + 0.05 * i).apply(state)
         feed.follow(Frame(state))
     assert jobs.wait_until_idle(PATIENCE)
     assert feed.drawing is not None
@@ -94,7 +94,7 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     assert feed.drawing.request.design.a3[0] == 18.0 + 0.05 * 24
     while redraws.acquire(blocking=False):
         pass
-    feed.follow(Frame(SetVariable("a3x", 18.5).apply(state)))
+    feed.follow(Frame(set_variable("a3x", 18.5).apply(state)))
     assert redraws.acquire(timeout=PATIENCE)
     surface = surface_of(feed)
     assert surface is not None
@@ -242,7 +242,7 @@ def test_cancelled_drawing_leaves_none_of_an_older_design() -> None:
     drawing = work.draw_workspace(jobs.orders[0].request)
     jobs.orders[0].done(drawing)
     assert feed.drawing is drawing
-    feed.follow(Frame(SetVariable("a3x", 18.0).apply(state)))
+    feed.follow(Frame(set_variable("a3x", 18.0).apply(state)))
     assert feed.drawing is drawing
     feed.cancel()
     assert feed.drawing is None

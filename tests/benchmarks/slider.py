@@ -30,7 +30,7 @@ from benchmarks.timing import Spread
 from explorer.app.features.mechanism.feature import JOINT_LABELS
 from explorer.app.scene.placing import scene_scale
 from explorer.app.server import Running
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.app.state.state import State
 from explorer.app.state.view import PrecisionView
 from explorer.mechanism.design_file import typical_machine
@@ -228,7 +228,7 @@ def measure() -> dict[str, list[Stopwatch]]:
         # The kinds take turns, so that no disturbance falls on one alone.
         for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
             for kind in KINDS:
-                session.do(Open(typical_machine(PRESS)[0] if kind.is_loaded else DESIGN))
+                session.do(open_design(typical_machine(PRESS)[0] if kind.is_loaded else DESIGN))
                 session.do(Set("view.forces.shown", kind.is_loaded))
                 session.do(Set("view.coordinates", "lengths"))
                 drawn = PrecisionView(ellipsoid=kind.is_loaded, deflected=kind.is_loaded)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.features.compare.feature import Pin
+from explorer.app.features.compare.feature import pin
 from explorer.app.features.compare.state import Compared
 from explorer.mechanism.design_file import PRESETS
 
 
 def test_button_in_markup_that_is_pressed_by_a_key_keeps_the_focus(tab: Tab) -> None:
     tab.turn_to("Compare")
-    tab.running.page.session.do(Pin(PRESETS["paper-initial"]))
+    tab.running.page.session.do(pin(PRESETS["paper-initial"]))
     overlay = tab.page.get_by_role("button", name="Overlay workspaces", exact=True)
     overlay.wait_for()
     tab.settle()

@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.app.state.actions import Set
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.moves import set_position
 
 
 def words_of_steps(tab: Tab) -> list[str]:
@@ -105,7 +105,7 @@ def test_field_keeps_what_is_typed_and_is_given_up_for_what_the_explorer_has(tab
     wait_for_x(tab, 3.25)
     # Given up, the field shows what the explorer has by now, not what it had at first.
     field.fill("abc")
-    session.do(SetPosition(0, 2.5))
+    session.do(set_position(0, 2.5))
     tab.wait_for(lambda: tab.shown("x") == 2.5, "x = 2.5")
     tab.settle()
     expect(field).to_have_value("abc")
@@ -118,7 +118,7 @@ def test_field_keeps_what_is_typed_and_is_given_up_for_what_the_explorer_has(tab
     wait_for_x(tab, 5.02)
     for z, elsewhere in ((8.0, None), (7.0, 4.0)):
         if elsewhere is not None:
-            session.do(SetPosition(0, elsewhere))
+            session.do(set_position(0, elsewhere))
             wait_for_x(tab, elsewhere)
         value = tab.state.pose.position[0]
         replace_all(tab, "x")
@@ -134,14 +134,14 @@ def test_number_that_arrives_leaves_a_field_selected_so_that_typing_replaces_it(
     session = tab.running.page.session
     for arrives, text, value in ((2.5, "7", 7.0), (12.75, "9.5", 9.5)):
         replace_all(tab, "x")
-        session.do(SetPosition(0, arrives))
+        session.do(set_position(0, arrives))
         wait_for_x(tab, arrives)
         tab.page.keyboard.type(text)
         tab.page.keyboard.press("Enter")
         wait_for_x(tab, value)
     # Escape goes back to the number that arrived, and an own choice of digits counts.
     replace_all(tab, "x")
-    session.do(SetPosition(0, 3.25))
+    session.do(set_position(0, 3.25))
     wait_for_x(tab, 3.25)
     tab.page.keyboard.type("8")
     tab.page.keyboard.press("Escape")
@@ -236,7 +236,7 @@ def test_field_that_is_left_takes_no_focus_with_its_next_number(tab: Tab) -> Non
         leave()
         wait_for_x(tab, value)
         value = next(numbers)
-        tab.running.page.session.do(SetPosition(0, value))
+        tab.running.page.session.do(set_position(0, value))
         wait_for_x(tab, value)
         assert not has_focus(tab, "x")
         expect(tab.field("x")).to_have_value(f"{value:g}")
@@ -267,7 +267,7 @@ def test_field_left_by_enter_leaves_the_next_key_to_the_commands(tab: Tab) -> No
         tab.wait_for(lambda before=before: tab.state.view.grid != before, "the grid")
         wait_for_x(tab, value)
     # What comes from the explorer later does not take the keys back.
-    tab.running.page.session.do(SetPosition(0, 4.0))
+    tab.running.page.session.do(set_position(0, 4.0))
     wait_for_x(tab, 4.0)
     tab.page.keyboard.press("g")
     tab.wait_for(lambda: tab.state.view.grid, "the grid again")

@@ -8,7 +8,7 @@ from contextlib import closing
 from playwright.sync_api import Browser, expect
 from tab import Tab
 
-from explorer.app.features.paths.actions import Go
+from explorer.app.features.paths.actions import go
 from explorer.app.features.paths.state import Stop
 from explorer.app.server import Running
 from explorer.app.state.actions import Set
@@ -110,7 +110,7 @@ def test_charts_of_a_path_are_no_wider_than_a_phone(browser: Browser, running: R
         ("paths.stops", (Stop(), Stop(HIGHER))),
     ):
         running.page.session.do(Set(path, value))
-    running.page.session.do(Go())
+    running.page.session.do(go())
     with closing(Tab(browser, running)) as tab:
         tab.resize(PHONE)
         tab.page.get_by_text(re.compile("^Optimise · ")).click()

@@ -17,7 +17,7 @@ from explorer.app.layout import DRAWER_HEIGHT, NARROW
 from explorer.app.scene.camera import framing
 from explorer.app.screenshot import SCENE_CANVAS
 from explorer.app.server import start
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.moves import set_position
 from explorer.app.state.state import State, open_state
 from explorer.mechanism.design_file import PRESETS
 
@@ -376,7 +376,7 @@ def wait_until_back(tab: Tab) -> None:
 
     What was typed in its first step stays.
     """
-    first = SetPosition(1, 0.6).apply(open_state(PRESETS["paper-optimal"]))
+    first = set_position(1, 0.6).apply(open_state(PRESETS["paper-optimal"]))
 
     def parts(state: State) -> tuple[object, ...]:
         return state.design, state.pose, state.view

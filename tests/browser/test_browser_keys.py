@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from tab import Tab
 
 from explorer.app.features.designs.feature import SavedDesigns
-from explorer.app.state.actions import Set, SetName
+from explorer.app.state.actions import Set, set_name
 from explorer.mechanism.pose import Pose
 
 CTRL, SHIFT = 2, 8
@@ -87,7 +87,7 @@ def test_azerty_has_views_by_its_row_of_digits_and_no_letter_by_a_comma(tab: Tab
 def test_ctrl_s_saves_and_ctrl_z_undoes_wherever_the_focus_is(data_tab: Tab) -> None:
     tab = data_tab
     session, saved = tab.running.page.session, tab.running.page.services.get(SavedDesigns)
-    session.do(SetName("mine"))
+    session.do(set_name("mine"))
     tab.settle()
     eye = tab.client.camera.position
     home = tab.state.pose

@@ -14,13 +14,13 @@ from server_clock import wait_until_drawn
 from tab import Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH, HANDLE_NAME
-from explorer.app.features.singularity.work import GoToSingularity
+from explorer.app.features.singularity.work import go_to_singularity
 from explorer.app.scene.camera import VIEWS, ViewName, framing
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetAngle, SetPose, SetPosition
+from explorer.app.state.moves import set_angle, set_pose, set_position
 from explorer.app.state.view import PrototypeView, View
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
@@ -114,10 +114,10 @@ INITIAL = pytest.param("paper-initial", marks=pytest.mark.long)
 @pytest.mark.parametrize("design", ["paper-optimal", INITIAL])
 def test_labels_lie_apart_and_stand_at_their_points_in_every_view(wide: Tab, design: str) -> None:
     session = wide.running.page.session
-    session.do(Open(PRESETS[design]))
+    session.do(open_design(PRESETS[design]))
     start = wide.state.pose
     for view in VIEWS:
-        session.do(SetPose(start))
+        session.do(set_pose(start))
         wide.look_from(view)
         assert not wide.page.evaluate(HAS_BOXES)
         for ghosts in (False, True):
@@ -130,8 +130,8 @@ def test_labels_lie_apart_and_stand_at_their_points_in_every_view(wide: Tab, des
             for (one, a), (other, b) in itertools.combinations(boxes.items(), 2):
                 assert not overlap(a, b), (view, ghosts, one, other)
         # They move with the mechanism.
-        session.do(SetPosition(2, 8.0))
-        session.do(SetAngle(1, 20.0))
+        session.do(set_position(2, 8.0))
+        session.do(set_angle(1, 20.0))
         labels = labels_of(wide)
         points = Placed(Frame(wide.state)).points
         for name in NAMES:
@@ -163,7 +163,7 @@ def test_label_behind_a_body_is_pale_but_not_that_of_a_gap(wide: Tab) -> None:
     show(wide, View())
     session = wide.running.page.session
     session.do(Set("design", with_radius(wide.state.design, 0.4)))
-    session.do(GoToSingularity(3))
+    session.do(go_to_singularity(3))
     assert not wait_for_hidden(wide, {b4}, hidden=True)[gap]["isHidden"]
 
 
@@ -302,7 +302,7 @@ def test_view_along_an_axis_has_no_perspective_until_it_is_turned(wide: Tab) -> 
 )
 def test_scale_bar_has_the_length_that_it_names_at_any_distance(wide: Tab, factor: float) -> None:
     design = scaled_design(PRESETS["paper-optimal"], factor)
-    wide.running.page.session.do(Open(design))
+    wide.running.page.session.do(open_design(design))
     assert wait_until_drawn(wide.running.page)
     placed = Placed(Frame(wide.state))
     wide.look_from("isometric")

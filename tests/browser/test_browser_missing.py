@@ -15,8 +15,8 @@ from tab import Tab, middle
 
 from explorer import PRESETS
 from explorer.app.server import Running
-from explorer.app.state.actions import Open
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.actions import open_design
+from explorer.app.state.moves import set_position
 from explorer.page.browser.headless import CHROMIUM_FLAGS, find_chromium
 
 # Lets time pass by a pause after which the page looks whether it was answered.
@@ -212,11 +212,11 @@ def test_scene_is_whole_again_once_the_browser_has_its_graphics_back(tab: Tab) -
         expect(told).to_be_visible()
         # What changes meanwhile is drawn too.
         for x in (4.0, 10.0):
-            session.do(SetPosition(0, x))
+            session.do(set_position(0, x))
             session.wait_until_idle()
         tab.page.evaluate(GIVE_BACK)
         expect(told).to_have_count(0)
         assert likeness(before, decoded(tab.picture())).spot < 2.0
     # What was made before is not deleted from the new graphics, of which the console would tell.
-    session.do(Open(PRESETS["paper-initial"]))
+    session.do(open_design(PRESETS["paper-initial"]))
     tab.picture()

@@ -14,7 +14,7 @@ from explorer.app.features.view.feature import ground_of, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetPose
+from explorer.app.state.moves import set_pose
 from explorer.app.state.state import open_state
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
@@ -79,13 +79,13 @@ def pose_at(share: float) -> Pose:
 
 def test_fast_motion_is_drawn_in_one_pose_in_each_frame(tab: Tab) -> None:
     poses = [pose_at(share) for share in np.linspace(0.0, 3.0, 80).tolist()]
-    tab.running.page.session.do(SetPose(poses[0]))
+    tab.running.page.session.do(set_pose(poses[0]))
     tab.running.page.session.do(Set("view.leaves", True))
     tab.picture()
     tab.page.evaluate(WATCH)
     for start in range(0, len(poses), AT_ONCE):
         for pose in poses[start : start + AT_ONCE]:
-            tab.running.page.session.do(SetPose(pose))
+            tab.running.page.session.do(set_pose(pose))
         assert tab.running.page.session.wait_until_idle()
         tab.settle()
     frames: list[Drawn] = tab.page.evaluate("window.explorer.stopWatching()")

@@ -16,7 +16,7 @@ from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.features.mechanism.modes import mode_hover
 from explorer.app.scene.placing import Placed
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.moves import set_position
 from explorer.app.state.state import State, joints_of
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.kinematics import forward
@@ -84,7 +84,7 @@ def test_row_of_a_mode_shows_its_ghost_while_it_is_pointed_at_and_is_chosen(tab:
     # A row that is replaced under the pointer, since its numbers change, is left later too.
     row_of_mode(tab, 2).hover()
     tab.wait_for(lambda: hovered.row == 2, "the ghost")
-    session.do(SetPosition(0, 11.0))
+    session.do(set_position(0, 11.0))
     expect(row_of_mode(tab, 2)).to_contain_text("11.0")
     tab.page.mouse.move(SIZE[0] // 2, 4)
     tab.wait_for(lambda: hovered.row is None, "no ghost any more")

@@ -26,7 +26,7 @@ from explorer.app.screenshot import (
 )
 from explorer.app.server import Running, start
 from explorer.app.state.actions import Set
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.moves import set_position
 from explorer.app.state.view import View
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.page.widgets.assigning import Update
@@ -157,7 +157,7 @@ def show(running: Running, view: View) -> None:
 
 def move_platform(running: Running, _: pytest.MonkeyPatch) -> None:
     x = running.page.session.state.pose.position[0]
-    running.page.session.do(SetPosition(0, x + 0.1))
+    running.page.session.do(set_position(0, x + 0.1))
 
 
 def turn_camera(running: Running, patch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import PAUSE_SECONDS
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetPosition
+from explorer.app.state.moves import set_position
 
 # Longer than the pause after which an event begins a step of its own, where no press is known.
 REST_SECONDS = PAUSE_SECONDS + 0.3
@@ -123,7 +123,7 @@ def test_release_that_is_reported_late_or_lost_ends_the_press(tab: Tab) -> None:
 def test_press_counts_after_a_reload_and_on_markup_that_is_replaced_meanwhile(tab: Tab) -> None:
     # It is the first press of its page each time.
     for value in (11.0, 12.0):
-        tab.running.page.session.do(SetPosition(0, value))
+        tab.running.page.session.do(set_position(0, value))
         tab.page.get_by_role("button", name=f"Undo x = {value:g}").click()
         tab.wait_for(lambda: tab.state.pose.position[0] == 10.0, "the pose of before")
         tab.wait_until_shown("x", 10.0)

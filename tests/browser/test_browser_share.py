@@ -24,7 +24,7 @@ import explorer
 from explorer.app.features.sharing.links import Link, encode_link
 from explorer.app.scene.placing import scene_scale
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Set, open_design
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import View
 from explorer.export.controller import kernel_files
@@ -121,7 +121,7 @@ def test_link_is_copied_and_opened_and_a_damaged_one_is_refused(tab: Tab) -> Non
     fragment = copied().partition("#")[2]
     # In a page that is open, and in one that opens.
     for opens in ("location.hash = it", "history.replaceState(null, '', `#${it}`)"):
-        session.do(Open(explorer.PRESETS["buildable"]))
+        session.do(open_design(explorer.PRESETS["buildable"]))
         tab.settle()
         tab.page.evaluate(f"it => {{ {opens} }}", fragment)
         if "replaceState" in opens:

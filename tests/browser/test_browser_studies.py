@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.features.studies.actions import OpenStudy
+from explorer.app.features.studies.actions import open_study
 from explorer.app.features.studies.feature import StudiesPanel
 from explorer.app.features.studies.figures import LEFT_OUT, PlotName, PlotRows, reading_of
 from explorer.app.features.studies.state import Studies, StudyPlan, within
@@ -175,14 +175,14 @@ def test_plots_that_are_gone_are_read_no_more(data_tab: Tab, folder: Path) -> No
     open_studies(tab)
     reading = tab.page.locator(".is-points + .ex-reading")
     for _ in range(2):
-        session.do(OpenStudy(folder.name))
+        session.do(open_study(folder.name))
         plotted = wait_for_plots(tab)
         row = loneliest_row(load_results(folder))
         x, y = plotted.places("points", np.array([row]))[0, 0].tolist()
         tab.page.mouse.move(*point_in(tab, "points", (x, y)))
         expect(reading).to_have_text(reading_of(plotted, "points", row)[0])
         # The study is closed in another tab, while the pointer rests on its plot.
-        session.do(OpenStudy(None))
+        session.do(open_study(None))
         expect(tab.page.locator("[data-plot]")).to_have_count(0)
         tab.page.mouse.move(WINDOW["width"] // 2, 4)
 

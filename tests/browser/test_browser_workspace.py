@@ -11,7 +11,7 @@ from playwright.sync_api import Locator, expect
 from tab import Tab
 
 from explorer.app.state.actions import Set
-from explorer.app.state.moves import SetAngle
+from explorer.app.state.moves import set_angle
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Tool
@@ -115,7 +115,7 @@ def test_reading_follows_the_mechanism_while_the_pointer_rests(tab: Tab) -> None
 
     tab.wait_for(is_of_the_state, "the reading of the first state")
     for yaw in np.arange(-70.0, -40.0, 2.0).tolist():
-        session.do(SetAngle(0, yaw))
+        session.do(set_angle(0, yaw))
     tab.wait_for(is_of_the_state, "the reading of the last state")
     # A load ten times as large has the same picture, with other numbers at its colours.
     force = re.compile(r"largest actuator force ([\d.,]+) N")

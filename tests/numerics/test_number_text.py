@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from explorer.app.features.singularity.feature import distance_table, measures_table, summary
-from explorer.app.features.singularity.work import GoToSingularity
+from explorer.app.features.singularity.work import go_to_singularity
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
 from explorer.cli.commands.kinematics import SingularityCommand
@@ -73,7 +73,7 @@ def test_page_and_command_at_a_singular_pose_show_no_rounding(
     incidence: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     start = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 10.0, 20.0))
-    frame = Frame(GoToSingularity(incidence).apply(open_state(PRESETS["paper-optimal"], start)))
+    frame = Frame(go_to_singularity(incidence).apply(open_state(PRESETS["paper-optimal"], start)))
     pose = frame.state.pose
     SingularityCommand(position=pose.position, quaternion=pose.quaternion).run()
     html = (summary(frame), distance_table(frame), measures_table(frame))

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from explorer.app.session.history import UserAction, check_drawable
-from explorer.app.state.actions import Open
+from explorer.app.state.actions import open_design
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.errors import ExplorerError
@@ -120,7 +120,7 @@ def attempt(data: bytes) -> State | None:
         assert decode_design(encode_design(design), "again") == design
         state = open_state(design)
         check_drawable(state)
-        later = UserAction(Open(design), "fuzz", 0.0).apply(state)
+        later = UserAction(open_design(design), "fuzz", 0.0).apply(state)
         frame = Frame(later)
         seen = frame.snapshot
         numbers = (*seen.joints, *seen.margins, *seen.volumes, seen.determinant, seen.proximity)

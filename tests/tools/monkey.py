@@ -38,7 +38,7 @@ from explorer.app.features.paths.state import Paths, journey_of
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
 from explorer.app.session.session import UNDONE
-from explorer.app.state.actions import Open
+from explorer.app.state.actions import open_design
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
@@ -380,7 +380,7 @@ class Monkey:
     def _preset(self) -> None:
         """Return to a sane design, lest all that follows happens to a monster."""
         page = self.running.page
-        page.session.do(Open(self._random.choice(list(PRESETS.values()))))
+        page.session.do(open_design(self._random.choice(list(PRESETS.values()))))
         self._did()
 
     def _value_for(self, handle: Any) -> Any:

@@ -25,21 +25,21 @@ from PIL import Image
 from playwright.sync_api import Browser, FloatRect, Page
 from server_clock import wait_until_drawn
 
-from explorer.app.features.compare.feature import Pin
+from explorer.app.features.compare.feature import pin
 from explorer.app.features.compare.state import CompareView
-from explorer.app.features.optimise.actions import StartRun
+from explorer.app.features.optimise.actions import start_run
 from explorer.app.features.optimise.state import OptimisationRequest
-from explorer.app.features.requirement.state import EXAMPLE, OpenFound
+from explorer.app.features.requirement.state import EXAMPLE, open_found
 from explorer.app.features.sharing.reporting import make_report
-from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign
+from explorer.app.features.studies.actions import brush_axes, open_study, pick_design
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.studies.state import Brush, within
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import draw_page, open_page, settle, stable_picture
 from explorer.app.server import FIRST_DESIGN, Running, start
-from explorer.app.state.actions import Action, Open, Set
-from explorer.app.state.geometry import SetVariable
-from explorer.app.state.moves import SetJoint, SetPose, SetPosition
+from explorer.app.state.actions import Action, Set, open_design
+from explorer.app.state.geometry import set_variable
+from explorer.app.state.moves import set_joint, set_pose, set_position
 from explorer.app.state.view import (
     ForcesView,
     PrecisionView,
@@ -113,7 +113,7 @@ def bare(**changes: Any) -> Action:
 
 SCENES = {
     "home": Scene(),
-    "page": Scene(panels=True, actions=(OpenFound(PRESETS[FIRST_DESIGN], EXAMPLE),)),
+    "page": Scene(panels=True, actions=(open_found(PRESETS[FIRST_DESIGN], EXAMPLE),)),
     # δ2 is small, the other two are not: both lines are orange and all else is blue.
     "near-singular": Scene(
         pose=Pose.of_yaw_pitch_roll((9, 8, 7.5), (-38, 24, 8)),
@@ -131,7 +131,7 @@ SCENES = {
         size=(960, 600),
     ),
     "unclosed": Scene(
-        actions=(Set("view.coordinates", "lengths"), SetJoint(JOINTS.index("l1"), 20.0)),
+        actions=(Set("view.coordinates", "lengths"), set_joint(JOINTS.index("l1"), 20.0)),
         panels=True,
     ),
     # Tall, so that the whole diagram is in it.
@@ -165,8 +165,8 @@ SCENES = {
     ),
     "forces": Scene(
         actions=(
-            Open(PRESS),
-            SetPosition(2, 6.0),
+            open_design(PRESS),
+            set_position(2, 6.0),
             bare(
                 flags=False,
                 grid=False,
@@ -178,8 +178,8 @@ SCENES = {
     ),
     "precision": Scene(
         actions=(
-            Open(typical_machine(PRESS)[0]),
-            SetPosition(2, 7.0),
+            open_design(typical_machine(PRESS)[0]),
+            set_position(2, 7.0),
             bare(
                 flags=False,
                 grid=False,
@@ -195,7 +195,7 @@ SCENES = {
     # Shares grow beyond all bounds towards the base plane.
     "load-share": Scene(
         actions=(
-            Open(PRESS),
+            open_design(PRESS),
             bare(
                 forces=LOAD, workspace=WorkspaceView(solid=True, colour="share", cut="y", level=5.0)
             ),
@@ -206,7 +206,7 @@ SCENES = {
     ),
     "held": Scene(
         actions=(
-            Open(PRESS),
+            open_design(PRESS),
             bare(forces=LOAD, workspace=WorkspaceView(solid=True, region="held")),
         ),
         panels=True,
@@ -227,15 +227,15 @@ SCENES = {
         size=(1280, 1000),
     ),
     "machine": Scene(
-        actions=(Open(PRESS), Set("view", View(handle=False))), panels=True, tab="Machine"
+        actions=(open_design(PRESS), Set("view", View(handle=False))), panels=True, tab="Machine"
     ),
     # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1.
     "compare": Scene(
         actions=(
             bare(),
-            Pin(DESIGN),
-            Pin(PRESETS["paper-initial"]),
-            SetVariable("a3x", 17.0),
+            pin(DESIGN),
+            pin(PRESETS["paper-initial"]),
+            set_variable("a3x", 17.0),
             Set("compared.look", CompareView(overlay=True)),
         ),
         panels=True,
@@ -245,13 +245,13 @@ SCENES = {
     # The paper's problem; a search is the same each time, so that its end can be shown.
     "optimise": Scene(
         actions=(
-            Open(paper_start()),
+            open_design(paper_start()),
             bare(),
             Set(
                 "optimisation.request",
                 OptimisationRequest(volume=PAPER_VOLUME, clearance=CLEARANCE),
             ),
-            StartRun(),
+            start_run(),
         ),
         panels=True,
         tab="Optimise",
@@ -332,9 +332,9 @@ def draw_studies(browser: Browser) -> bytes:
         try:
             session, jobs = running.page.session, running.page.services.jobs
             session.do(bare())
-            session.do(OpenStudy(study.name))
-            session.do(PickDesign(results.design_of_row(row), index=index, study=study.name))
-            session.do(BrushAxes(brushes))
+            session.do(open_study(study.name))
+            session.do(pick_design(results.design_of_row(row), index=index, study=study.name))
+            session.do(brush_axes(brushes))
             session.wait_until_idle()
             assert jobs.wait_until_idle(60.0)
             session.wait_until_idle()
@@ -364,7 +364,7 @@ def draw_motion(browser: Browser) -> bytes:
         running.page.point_cameras("isometric")
         for fold in second + (LAST_FOLD - second) * turn:
             pose = pose_of_folds([r, beta, epsilon, first, fold, third])
-            running.page.session.do(SetPose(pose))
+            running.page.session.do(set_pose(pose))
             assert wait_until_drawn(running.page, 60.0)
             settle(page, client)
             page.evaluate("window.explorer.drawFrame()")

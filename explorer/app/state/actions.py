@@ -1,14 +1,15 @@
 """Actions: everything that can be done to the state, each a small frozen value.
 
-An action turns one state into the next, or raises an `ExplorerError` and changes nothing.
+An action turns one state into the next, or raises an `ExplorerError` and changes nothing. Most are
+functions that `action` makes into actions; `Set` sets one value.
 """
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
-from typing import ClassVar, cast
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Concatenate, ParamSpec, cast
 
 import msgspec
 
@@ -18,24 +19,20 @@ from explorer.app.state.view import DrawnAs
 from explorer.mechanism.design import Design
 from explorer.numerics.number_text import format_number
 
-DESIGN = "{design}"
 
-
+@dataclass(frozen=True)
 class Action(ABC):
-    """A change of the state; actions are frozen dataclasses that inherit from this one.
+    """A change of the state.
 
     Attributes:
-        template: What the action does, for the history, as a format string of `action` and of
-            `design`, the name of the design after it; "" for the name of the class.
         continues: Whether the action belongs to the step before it.
         repeats: Whether it belongs to the step before it if both have the same words.
         is_jump: Whether the platform did not move from the pose before to that after it.
     """
 
-    template: ClassVar[str] = ""
-    continues: ClassVar[bool] = False
-    repeats: ClassVar[bool] = False
-    is_jump: ClassVar[bool] = False
+    continues: bool = field(default=False, kw_only=True)
+    repeats: bool = field(default=False, kw_only=True)
+    is_jump: bool = field(default=False, kw_only=True)
 
     @abstractmethod
     def apply(self, state: State) -> State:
@@ -46,17 +43,58 @@ class Action(ABC):
         """
         ...
 
-    def words(self) -> str:
-        """Return the words for the action; "{design}" stands for the design's name after it."""
-        if self.template:
-            return self.template.format(action=self, design=DESIGN)
-        # "SetObjective" reads "Objective".
-        name = re.sub("(?<=.)([A-Z])", r" \1", type(self).__name__).lower()
-        return name.removeprefix("set ").capitalize()
+    def describe(self, after: State, /) -> str:
+        """Return a description of the step that led to a state; "" for an action that ends none."""
+        del after
+        return ""
 
-    def describe(self, after: State) -> str:
-        """Return a description of the step that led to a state."""
-        return self.words().replace(DESIGN, after.design.name)
+
+Words = str | Callable[..., str]
+"""What an action does, for the history: words, in which "{design}" stands for the name of the
+design after it, or a function that returns them for the state after it and the arguments."""
+
+Arguments = ParamSpec("Arguments")
+
+
+@dataclass(frozen=True)
+class Act(Action):
+    """A function of the state with its other arguments, and its words."""
+
+    change: Callable[..., State]
+    arguments: tuple[object, ...]
+    named: Mapping[str, object]
+    words: Words
+
+    def apply(self, state: State) -> State:
+        """Return what the function makes of a state."""
+        return self.change(state, *self.arguments, **self.named)
+
+    def describe(self, after: State, /) -> str:
+        """Return the words for the action."""
+        words: Any = self.words
+        if callable(words):
+            words = words(after, *self.arguments, **self.named)
+        return str(words).replace("{design}", after.design.name)
+
+
+def action(
+    words: Words, **kind: bool
+) -> Callable[[Callable[Concatenate[State, Arguments], State]], Callable[Arguments, Act]]:
+    """Make a function from a state and other arguments to the next state an action of these.
+
+    Its words are given, and what else `Action` says of it.
+    """
+
+    def decorate(
+        change: Callable[Concatenate[State, Arguments], State],
+    ) -> Callable[Arguments, Act]:
+        def make(*arguments: Arguments.args, **named: Arguments.kwargs) -> Act:
+            return Act(change, arguments, named, words, **kind)
+
+        make.__name__, make.__doc__ = change.__name__, change.__doc__
+        return make
+
+    return decorate
 
 
 def value_text(value: object) -> str:
@@ -72,67 +110,39 @@ def value_text(value: object) -> str:
     return str(value)
 
 
-@dataclass(frozen=True)
-class Open(Action):
-    """Open a design in its home pose; parts of the state stay as they declare."""
+@action("Open {design}", is_jump=True)
+def open_design(state: State, design: Design) -> State:
+    """Open a design in its home pose; parts of the state stay as they declare.
 
-    template: ClassVar[str] = "Open {design}"
-    is_jump: ClassVar[bool] = True
-
-    design: Design
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        state.check_free()
-        kept = parts_kept_on_open(state.in_unit_of(self.design))
-        return replace(open_state(self.design), **kept)
+    The action is refused while the design is being optimised.
+    """
+    state.check_free()
+    return replace(open_state(design), **parts_kept_on_open(state.in_unit_of(design)))
 
 
-@dataclass(frozen=True)
-class Reset(Action):
+@action("Reset to {design} as it was opened", is_jump=True)
+def reset_design(state: State) -> State:
     """Return to the design as it was opened, in its home pose."""
-
-    template: ClassVar[str] = "Reset to {design} as it was opened"
-    is_jump: ClassVar[bool] = True
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return Open(state.base).apply(state)
+    return open_design(state.base).apply(state)
 
 
-@dataclass(frozen=True)
-class SetName(Action):
-    """Give the design another name."""
+@action("Call it {design}")
+def set_name(state: State, name: str) -> State:
+    """Give the design another name, unless it is being optimised.
 
-    template: ClassVar[str] = "Call it {design}"
-
-    name: str
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised.
-
-        Raises:
-            DesignError: The name is blank, or not one printable line.
-        """
-        state.check_free()
-        return replace(state, design=msgspec.structs.replace(state.design, name=self.name))
+    Raises:
+        DesignError: The name is blank, or not one printable line.
+    """
+    state.check_free()
+    return with_value(state, "design.name", name)
 
 
-@dataclass(frozen=True)
-class MarkSaved(Action):
-    """Take a design that has been saved as the one to which reset returns."""
-
-    continues: ClassVar[bool] = True
-
-    design: Design
-
-    def apply(self, state: State) -> State:
-        """Return the next state; the design has the name under which it was saved."""
-        renamed = msgspec.structs.replace(state.design, name=self.design.name)
-        if renamed != self.design:
-            # The design was changed while it was being saved.
-            return replace(state, base=self.design)
-        return replace(state, design=renamed, base=self.design)
+@action("", continues=True)
+def mark_saved(state: State, saved: Design) -> State:
+    """Take a design that has been saved as the one to which reset returns, with its name."""
+    renamed = msgspec.structs.replace(state.design, name=saved.name)
+    # The design may have been changed while it was being saved.
+    return replace(state, design=renamed if renamed == saved else state.design, base=saved)
 
 
 @dataclass(frozen=True)
@@ -162,8 +172,8 @@ class Set(Action):
             design = msgspec.structs.replace(design, required_box=box)
         return replace(state.in_unit_of(design), design=design)
 
-    def words(self) -> str:
-        """Return the words for the action."""
+    def describe(self, _: State, /) -> str:
+        """Return the name and the value."""
         name = self.name or self.at.rpartition(".")[2].replace("_", " ").capitalize()
         if self.text:
             return f"{name}: {self.text}"

@@ -7,10 +7,10 @@ A fold of 0 or 180° is a wall between two assembly modes. There it has the sign
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from explorer.app.state.actions import Action
-from explorer.app.state.moves import FULL_TURN, move_to
+from explorer.app.state.actions import action
+from explorer.app.state.moves import angle_text, move_to
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import Folds, GivenFolds, State
 from explorer.errors import InputError
@@ -25,36 +25,31 @@ FLAT = 1e-9
 FIRST_FOLD = FOLDS.index("φ1")
 
 
-@dataclass(frozen=True)
-class SetFold(Action):
-    """Set one coordinate of the folds, named by its index in `FOLDS`; the other five stay.
+def _fold_words(after: State, index: int, value: float) -> str:
+    if index > 0:
+        return f"{FOLDS[index]} = {angle_text(value)}"
+    return f"{FOLDS[0]} = {after.unit.text(value, 6, size=after.design.reach)}"
+
+
+@action(_fold_words)
+def set_fold(state: State, index: int, value: float) -> State:
+    """Set one coordinate of the folds, by its index in `FOLDS`; the other five stay.
 
     r is in design units, the others are in degrees. A fold that is set flat stays in its mode.
+
+    Raises:
+        InputError: The coordinate is beyond its range.
     """
-
-    index: int
-    value: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse a coordinate beyond its range."""
-        index, value = self.index, self.value
-        least = -HALF_TURN if index >= FIRST_FOLD else 0.0
-        if index > 0 and not least <= value <= HALF_TURN:
-            low, high, given = format_apart((least, HALF_TURN, value), 6, format_number)
-            raise InputError(f"{FOLDS[index]} must be {low}° to {high}°; got {given}°")
-        folds = with_value(folds_of(state), str(index), value)
-        pose = pose_of_folds(folds)
-        mode = state.mode
-        if index >= FIRST_FOLD and abs(value) not in {0.0, HALF_TURN}:
-            bit = int(MODE_BITS[index - FIRST_FOLD])
-            mode = mode | bit if value > 0.0 else mode & ~bit
-        return replace(move_to(state, pose), mode=mode, set_folds=GivenFolds(folds, pose))
-
-    def describe(self, after: State) -> str:
-        """Return which coordinate has which value."""
-        if self.index > 0:
-            return f"{FOLDS[self.index]} = {format_number(self.value, 6, size=FULL_TURN)}°"
-        return f"{FOLDS[0]} = {after.unit.text(self.value, 6, size=after.design.reach)}"
+    least = -HALF_TURN if index >= FIRST_FOLD else 0.0
+    if index > 0 and not least <= value <= HALF_TURN:
+        low, high, given = format_apart((least, HALF_TURN, value), 6, format_number)
+        raise InputError(f"{FOLDS[index]} must be {low}° to {high}°; got {given}°")
+    folds = with_value(folds_of(state), str(index), value)
+    pose, mode = pose_of_folds(folds), state.mode
+    if index >= FIRST_FOLD and abs(value) not in {0.0, HALF_TURN}:
+        bit = int(MODE_BITS[index - FIRST_FOLD])
+        mode = mode | bit if value > 0.0 else mode & ~bit
+    return replace(move_to(state, pose), mode=mode, set_folds=GivenFolds(folds, pose))
 
 
 def folds_of(state: State) -> Folds:

@@ -12,12 +12,12 @@ A length that stays keeps its value in the unit that the page shows, millimetres
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import Any
 
 import msgspec
 
-from explorer.app.state.actions import Action, Open, Set
+from explorer.app.state.actions import Act, Set, action, open_design
 from explorer.app.state.moves import assemble, move_to
 from explorer.app.state.parts import in_unit
 from explorer.app.state.state import State
@@ -65,9 +65,9 @@ def preset_of(design: Design) -> str | None:
     return design.name if preset == without_machine(design) else None
 
 
-def open_geometry(design: Design, state: State) -> Open:
+def open_geometry(design: Design, state: State) -> Act:
     """Return the action that opens a design, in its home pose, with the machine of a state."""
-    return Open(with_machine(design, state.design, state.view))
+    return open_design(with_machine(design, state.design, state.view))
 
 
 def set_unit(state: State, unit_mm: float) -> Set:
@@ -77,47 +77,35 @@ def set_unit(state: State, unit_mm: float) -> Set:
     return Set("design", design, "1 unit", f"{format_number(unit_mm, 6)} mm")
 
 
-@dataclass(frozen=True)
-class SetVariable(Action):
-    """Set one design variable, named as in `VARIABLES`; `State.hold` says what stays."""
-
-    name: str
-    value: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            DesignError: The design would be degenerate.
-            InputError: The legs are held and cannot close in the new design, or the
-                design is being optimised.
-        """
-        state.check_free()
-        design = state.design.with_variable(self.name, self.value)
-        if state.hold == "pose":
-            return move_to(replace(state, design=design), state.pose, state.yaw_pitch_roll)
-        solution = forward(design, state.joints)
-        if not solution.feasible:
-            present = state.design.variables[VARIABLES.index(self.name)]
-            raise InputError(
-                f"{self.name} = {state.unit.text(self.value, 6)} cannot be assembled while the "
-                f"legs are held; it stays {state.unit.text(present, 6)}. Hold the pose to go "
-                "further."
-            )
-        return assemble(replace(state, design=design), solution, state.mode)
-
-    def describe(self, after: State) -> str:
-        """Return which variable has which value."""
-        return f"{self.name} = {after.unit.text(self.value, 6)}"
+def _variable_words(after: State, name: str, value: float) -> str:
+    return f"{name} = {after.unit.text(value, 6)}"
 
 
-@dataclass(frozen=True)
-class ClearMachine(Action):
-    """Take the machine away."""
+@action(_variable_words)
+def set_variable(state: State, name: str, value: float) -> State:
+    """Set one design variable, named as in `VARIABLES`; `State.hold` says what stays.
 
-    template: ClassVar[str] = "Ideal machine"
+    Raises:
+        DesignError: The design would be degenerate.
+        InputError: The legs are held and cannot close in the new design, or the design is being
+            optimised.
+    """
+    state.check_free()
+    design = state.design.with_variable(name, value)
+    if state.hold == "pose":
+        return move_to(replace(state, design=design), state.pose, state.yaw_pitch_roll)
+    solution = forward(design, state.joints)
+    if not solution.feasible:
+        present = state.design.variables[VARIABLES.index(name)]
+        raise InputError(
+            f"{name} = {state.unit.text(value, 6)} cannot be assembled while the legs are held; "
+            f"it stays {state.unit.text(present, 6)}. Hold the pose to go further."
+        )
+    return assemble(replace(state, design=design), solution, state.mode)
 
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        state.check_free()
-        return replace(state, design=without_machine(state.design))
+
+@action("Ideal machine")
+def clear_machine(state: State) -> State:
+    """Take the machine away, unless the design is being optimised."""
+    state.check_free()
+    return replace(state, design=without_machine(state.design))

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
 
 import numpy as np
 
 from explorer.app.state import state as states
-from explorer.app.state.actions import Action
+from explorer.app.state.actions import action
 from explorer.app.state.clear_length import clear_length
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, angles_of, joints_of, open_state
-from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.design import JOINTS
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
 from explorer.mechanism.folds import assembly_modes
 from explorer.mechanism.kinematics import ForwardKinematics, discriminants, forward
@@ -24,147 +23,106 @@ from explorer.numerics.number_text import format_number
 FULL_TURN = 360.0
 
 
-@dataclass(frozen=True)
-class GoHome(Action):
+@action("Home pose")
+def go_home(state: State) -> State:
     """Move to the home pose."""
-
-    template: ClassVar[str] = "Home pose"
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return move_to(state, open_state(state.design).pose)
+    return move_to(state, open_state(state.design).pose)
 
 
-@dataclass(frozen=True)
-class SetJoint(Action):
-    """Set one joint, named by its index in `JOINTS`; the others stay."""
+def _joint_words(after: State, joint: int, value: float) -> str:
+    return f"{JOINTS[joint]} = {after.unit.text(value, 6, size=after.design.reach)}"
 
-    joint: int
-    value: float
 
-    def apply(self, state: State) -> State:
-        """Return the next state; where the lengths cannot close, with the last pose."""
-        joints = with_value(state.joints, str(self.joint), self.value)
-        solution = forward(state.design, joints)
-        if not solution.feasible:
-            return replace(
-                state, joints=joints, unclosed=_unclosed_error(state.design, joints, self)
-            )
+@action(_joint_words)
+def set_joint(state: State, joint: int, value: float) -> State:
+    """Set one joint, by its index in `JOINTS`; where the lengths cannot close, keep the pose."""
+    joints = with_value(state.joints, str(joint), value)
+    solution = forward(state.design, joints)
+    if solution.feasible:
         return assemble(replace(state, joints=joints), solution, state.mode)
-
-    def describe(self, after: State) -> str:
-        """Return which joint has which value."""
-        return f"{JOINTS[self.joint]} = {after.unit.text(self.value, 6, size=after.design.reach)}"
-
-
-@dataclass(frozen=True)
-class UseNearest(Action):
-    """Set the nearest length that closes and stays clear, in place of one that does not close."""
-
-    template: ClassVar[str] = "Nearest usable length"
-
-    def apply(self, state: State) -> State:
-        """Return the next state, with a remark on why this length was taken."""
-        unclosed = state.unclosed
-        if unclosed is None:
-            return state
-        nearest = clear_length(state)
-        if nearest is None:
-            return move_to(state, state.pose)
-        value, words = nearest
-        after = SetJoint(unclosed.joint, value).apply(state)
-        return replace(after, taken=(after.joints, words))
+    values = np.array(joints)
+    intervals = feasible_intervals(state.design, values)[joint]
+    unclosed = states.Unclosed(
+        joint=joint,
+        asked=value,
+        nearest=nearest_feasible(state.design, values, joint, intervals),
+        failing=tuple(np.flatnonzero(discriminants(state.design, values) < 0.0).tolist()),
+    )
+    return replace(state, joints=joints, unclosed=unclosed)
 
 
-@dataclass(frozen=True)
-class SetPosition(Action):
+@action("Nearest usable length")
+def use_nearest(state: State) -> State:
+    """Set the nearest length that closes and stays clear, in place of one that does not close.
+
+    The next state has a remark on why this length was taken.
+    """
+    unclosed, nearest = state.unclosed, clear_length(state)
+    if unclosed is None or nearest is None:
+        return state if unclosed is None else move_to(state, state.pose)
+    value, words = nearest
+    after = set_joint(unclosed.joint, value).apply(state)
+    return replace(after, taken=(after.joints, words))
+
+
+def _position_words(after: State, axis: int, value: float) -> str:
+    name = "xyz"[axis] if after.view.at == "b4" else f"{'xyz'[axis]} of {after.point}"
+    return f"{name} = {after.unit.text(value, 6, size=after.design.reach)}"
+
+
+@action(_position_words)
+def set_position(state: State, axis: int, value: float) -> State:
     """Set one coordinate of b4 or of the tool point, 0 to 2."""
-
-    axis: int
-    value: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        # The other coordinates are kept to the last bit.
-        value = self.value - float(state.offset(state.pose.rotation)[self.axis])
-        position = with_value(state.pose.position, str(self.axis), value)
-        return move_to(state, Pose(position, state.pose.quaternion), state.yaw_pitch_roll)
-
-    def describe(self, after: State) -> str:
-        """Return which coordinate has which value."""
-        name = "xyz"[self.axis]
-        if after.view.at != "b4":
-            name += f" of {after.point}"
-        return f"{name} = {after.unit.text(self.value, 6, size=after.design.reach)}"
+    # The other coordinates are kept to the last bit.
+    own = value - float(state.offset(state.pose.rotation)[axis])
+    position = with_value(state.pose.position, str(axis), own)
+    return move_to(state, Pose(position, state.pose.quaternion), state.yaw_pitch_roll)
 
 
-@dataclass(frozen=True)
-class SetAngle(Action):
+def angle_text(angle: float) -> str:
+    """Return an angle in degrees for the history."""
+    return f"{format_number(angle, 6, size=FULL_TURN)}°"
+
+
+def _angle_words(_: State, axis: int, value: float) -> str:
+    return f"{('yaw', 'pitch', 'roll')[axis]} = {angle_text(value)}"
+
+
+@action(_angle_words)
+def set_angle(state: State, axis: int, value: float) -> State:
     """Set yaw, pitch or roll, 0 to 2, in degrees; the point that the position is of stays."""
-
-    axis: int
-    value: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        angles = with_value(state.yaw_pitch_roll, str(self.axis), self.value)
-        orientation = Pose.of_yaw_pitch_roll(state.pose.position, angles)
-        return move_to(state, state.pose_at(state.position, orientation), angles)
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        angle = format_number(self.value, 6, size=FULL_TURN)
-        return f"{('yaw', 'pitch', 'roll')[self.axis]} = {angle}°"
+    angles = with_value(state.yaw_pitch_roll, str(axis), value)
+    orientation = Pose.of_yaw_pitch_roll(state.pose.position, angles)
+    return move_to(state, state.pose_at(state.position, orientation), angles)
 
 
-@dataclass(frozen=True)
-class SetPose(Action):
+def _pose_words(after: State, _: Pose) -> str:
+    unit, size = after.unit, after.design.reach
+    place = (unit.number(x, size=size) for x in after.position)
+    return f"Move {after.point} to {', '.join(place)} {unit.name}"
+
+
+@action(_pose_words)
+def set_pose(state: State, pose: Pose) -> State:
     """Set the whole pose, for instance by the drag handle."""
-
-    pose: Pose
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return move_to(state, self.pose)
-
-    def describe(self, after: State) -> str:
-        """Return where the platform is."""
-        unit, size = after.unit, after.design.reach
-        place = (unit.number(x, size=size) for x in after.position)
-        return f"Move {after.point} to {', '.join(place)} {unit.name}"
+    return move_to(state, pose)
 
 
-@dataclass(frozen=True)
-class StartThere(Action):
+@action("Start where nothing is in the way")
+def start_there(state: State, pose: Pose) -> State:
     """Move to a pose, and let the accessible workspace start there."""
-
-    template: ClassVar[str] = "Start where nothing is in the way"
-
-    pose: Pose
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        workspace = replace(state.view.workspace, start="pose")
-        return move_to(replace(state, view=replace(state.view, workspace=workspace)), self.pose)
+    return move_to(with_value(state, "view.workspace.start", "pose"), pose)
 
 
-@dataclass(frozen=True)
-class SetMode(Action):
+def _mode_words(_: State, mode: int) -> str:
+    return f"Assembly mode {mode} ({mode_name(mode)})"
+
+
+@action(_mode_words, is_jump=True)
+def set_mode(state: State, mode: int) -> State:
     """Jump to another assembly mode of the same joints."""
-
-    is_jump: ClassVar[bool] = True
-
-    mode: int
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        positions, rotations = assembly_modes(state.pose.position, state.pose.rotation)
-        pose = Pose.of(positions[self.mode], rotations[self.mode])
-        return replace(move_to(state, pose), mode=self.mode)
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        return f"Assembly mode {self.mode} ({mode_name(self.mode)})"
+    positions, rotations = assembly_modes(state.pose.position, state.pose.rotation)
+    return replace(move_to(state, Pose.of(positions[mode], rotations[mode])), mode=mode)
 
 
 def move_to(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:
@@ -183,16 +141,3 @@ def assemble(state: State, solution: ForwardKinematics, mode: int) -> State:
     """Return the state in one of the eight poses that its joints have."""
     pose = Pose.of(solution.position[mode], solution.rotation[mode])
     return replace(state, pose=pose, yaw_pitch_roll=angles_of(pose), mode=mode, unclosed=None)
-
-
-def _unclosed_error(design: Design, joints: states.Joints, cause: SetJoint) -> states.Unclosed:
-    values = np.array(joints)
-    squares = discriminants(design, values)
-    failing = tuple(int(i) for i in np.flatnonzero(squares < 0.0))
-    intervals = feasible_intervals(design, values)[cause.joint]
-    return states.Unclosed(
-        joint=cause.joint,
-        asked=cause.value,
-        nearest=nearest_feasible(design, values, cause.joint, intervals),
-        failing=failing,
-    )

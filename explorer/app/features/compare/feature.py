@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from html import escape
-from typing import ClassVar
 
 import viser
 
@@ -18,7 +16,7 @@ from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.session.session import Change
-from explorer.app.state.actions import Action, Open
+from explorer.app.state.actions import Action, action, open_design
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
 from explorer.app.state.parts import with_value
@@ -35,42 +33,38 @@ from explorer.page.widgets.assigning import Update
 MOST_BUTTONS = 12
 
 
-@dataclass(frozen=True)
-class Pin(Action):
-    """Pin a copy of a design beside the live one, in the first free place."""
-
-    template: ClassVar[str] = "Pin {action.design.name}"
-
-    design: Design
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse a design that is pinned already, or has no place."""
-        compared, name = Compared.of(state), self.design.name
-        slot = compared.slot_of(self.design)
-        if slot is not None:
-            raise InputError(
-                f"{name} is pinned already, as {SLOTS[slot]}; change it, or pin another design"
-            )
-        if None not in compared.pinned:
-            raise InputError(
-                f"{name} cannot be pinned: {', '.join(SLOTS)} are taken; unpin one of them first"
-            )
-        return with_value(state, f"compared.pinned.{compared.pinned.index(None)}", self.design)
+def _pin_words(_: State, design: Design) -> str:
+    return f"Pin {design.name}"
 
 
-@dataclass(frozen=True)
-class Unpin(Action):
+@action(_pin_words)
+def pin(state: State, design: Design) -> State:
+    """Pin a copy of a design beside the live one, in the first free place.
+
+    Raises:
+        InputError: The design is pinned already, or there is no free place.
+    """
+    compared, slot = Compared.of(state), Compared.of(state).slot_of(design)
+    if slot is not None:
+        raise InputError(
+            f"{design.name} is pinned already, as {SLOTS[slot]}; change it, or pin another design"
+        )
+    if None not in compared.pinned:
+        places = ", ".join(SLOTS)
+        raise InputError(
+            f"{design.name} cannot be pinned: {places} are taken; unpin one of them first"
+        )
+    return with_value(state, f"compared.pinned.{compared.pinned.index(None)}", design)
+
+
+def _unpin_words(_: State, slot: int) -> str:
+    return f"Unpin {SLOTS[slot]}"
+
+
+@action(_unpin_words)
+def unpin(state: State, slot: int) -> State:
     """Remove the pinned design from a place, 0 to 2; do nothing if the place is free."""
-
-    slot: int
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        return f"Unpin {SLOTS[self.slot]}"
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return with_value(state, f"compared.pinned.{self.slot}", None)
+    return with_value(state, f"compared.pinned.{slot}", None)
 
 
 LOOKS = {
@@ -95,18 +89,18 @@ LOOKS = {
 }
 
 
-def _open(slot: int, state: State) -> Open:
+def _open(slot: int, state: State) -> Action:
     design = Compared.of(state).pinned[slot]
     if design is None:
         raise InputError(f"nothing is pinned as {SLOTS[slot]}; pin a design first")
-    return Open(design)
+    return open_design(design)
 
 
 PLACE_BUTTONS: tuple[tuple[str, Callable[[int, State], Action], str, str], ...] = (
     ("open", _open, "Open pinned", "Make it the live design; undo brings back the present one."),
     (
         "unpin",
-        lambda slot, _: Unpin(slot),
+        lambda slot, _: unpin(slot),
         "Unpin",
         "Remove it from the comparison; undo brings it back.",
     ),
@@ -188,7 +182,7 @@ class ComparePanel:
     def _pin(self, name: str) -> Change | None:
         """Return the action that pins the named design, or the live one for ""."""
         chosen = self._choices().get(name)
-        return None if name and chosen is None else lambda state: Pin(chosen or state.design)
+        return None if name and chosen is None else lambda state: pin(chosen or state.design)
 
 
 def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:

@@ -19,7 +19,7 @@ from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.session.history import HistoryStep
 from explorer.app.session.session import Who
-from explorer.app.state.actions import Action, MarkSaved, Open, SetName
+from explorer.app.state.actions import Action, mark_saved, open_design, set_name
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import open_geometry
 from explorer.app.state.view import View
@@ -90,13 +90,13 @@ class SavedDesigns:
                 raise InputError(
                     f"{design.name!r} is a preset and stays as it is; give yours another name"
                 )
-            self._session.do(MarkSaved(self._library.save(design.name, design)))
+            self._session.do(mark_saved(self._library.save(design.name, design)))
 
         self._post(work, who)
 
     def save_copy(self, design: Design, who: Who = None) -> None:
         """Save the live design under a new name, which it takes itself."""
-        self._post(lambda: self._session.do(MarkSaved(self._copy(design))), who)
+        self._post(lambda: self._session.do(mark_saved(self._copy(design))), who)
 
     def rename(self, old: str, new: str, who: Who = None) -> None:
         """Give a saved design another name."""
@@ -104,13 +104,13 @@ class SavedDesigns:
         def work() -> None:
             if old not in {entry.name for entry in self._library.list()}:
                 raise InputError("the design is not saved yet; save it before you rename it")
-            self._session.do(MarkSaved(self._library.rename(old, new)))
+            self._session.do(mark_saved(self._library.rename(old, new)))
 
         self._post(work, who)
 
     def open(self, name: str, who: Who = None) -> None:
         """Open a saved design."""
-        self._post(lambda: self._session.do(Open(self._library.open(name))), who)
+        self._post(lambda: self._session.do(open_design(self._library.open(name))), who)
 
     def copy(self, design: Design, who: Who = None) -> None:
         """Save a copy of a design under a new name; the live one stays as it is."""
@@ -141,7 +141,7 @@ class SavedDesigns:
             if not (is_json or suffixes):
                 raise InputError(f"{name} is no design, study or session; these are JSON files")
             fields = field_names(data) if is_json else suffixes
-            opener = next((openers[each] for each in openers if each in fields), open_design)
+            opener = next((openers[each] for each in openers if each in fields), open_design_file)
             action, words = opener(self._services, data, name)
             before = self._session.latest_state()
             self._session.do(action, who=who)
@@ -180,10 +180,10 @@ class SavedDesigns:
         self._session.redraw()
 
 
-def open_design(_: Services, data: bytes, name: str) -> tuple[Action, str]:
+def open_design_file(_: Services, data: bytes, name: str) -> tuple[Action, str]:
     """Return the action that opens the design in a file, and what it is; see `Opener`."""
     design = decode_design(data, name)
-    return Open(design), f"The design {design.name}."
+    return open_design(design), f"The design {design.name}."
 
 
 # Name of the button that shows why the session is not saved, and its label.
@@ -245,7 +245,7 @@ class DesignsPanel:
         self._controls.text(
             "Name",
             "Name of the live design, under which it is saved.",
-            ControlBinding(lambda frame: frame.state.design.name, lambda _, name: SetName(name)),
+            ControlBinding(lambda frame: frame.state.design.name, lambda _, name: set_name(name)),
             disabled=lambda state: bool(state.busy),
         )
         actions: dict[str, Callable[[Who], None]] = {

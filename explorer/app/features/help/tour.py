@@ -13,17 +13,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from html import escape
-from typing import ClassVar
 
 import viser
 
 from explorer.app.features.feature import Runner, Services
-from explorer.app.features.optimise.actions import CancelRun, Revert, StartRun, TakePaperProblem
+from explorer.app.features.optimise.actions import (
+    cancel_run,
+    revert,
+    start_run,
+    take_paper_problem,
+)
 from explorer.app.features.optimise.state import Optimisation, SearchRun
-from explorer.app.state.actions import Action, Set
+from explorer.app.state.actions import Act, Action, Set, action
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import SetVariable
-from explorer.app.state.moves import GoHome, SetPosition, move_to
+from explorer.app.state.geometry import set_variable
+from explorer.app.state.moves import go_home, move_to, set_position
 from explorer.app.state.parts import take_back, with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
@@ -73,22 +77,18 @@ Change = tuple[State, State]
 """The states before and after an action of the tour."""
 
 
-@dataclass(frozen=True)
-class EndTour(Action):
-    """Take back what the tour has changed, with the search from a design that it opened."""
+@action("End the tour")
+def end_tour(state: State, changes: tuple[Change, ...]) -> State:
+    """Take back what the tour has changed, with the search from a design that it opened.
 
-    template: ClassVar[str] = "End the tour"
-
-    changes: tuple[Change, ...]
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while a design is being optimised."""
-        after, run = state, own_search(state, self.changes)
-        if run is not None and not run.accepted:
-            after = with_value(Revert().apply(state), "optimisation.run", None)
-        for change in reversed(self.changes):
-            after = _take_back(change, after)
-        return replace(after.for_step().restore_over(state), view=after.view)
+    The action is refused while a design is being optimised.
+    """
+    after, run = state, own_search(state, changes)
+    if run is not None and not run.accepted:
+        after = with_value(revert().apply(state), "optimisation.run", None)
+    for change in reversed(changes):
+        after = _take_back(change, after)
+    return replace(after.for_step().restore_over(state), view=after.view)
 
 
 def own_search(state: State, changes: Sequence[Change]) -> SearchRun | None:
@@ -121,7 +121,7 @@ def _approach(frame: Frame) -> Action:
     """Lower b4 towards the base plane: δ3 is its height."""
     state = frame.state
     height = math.copysign(NEAR * state.warn_below, state.pose.position[2])
-    return SetPosition(2, height + float(state.offset(state.pose.rotation)[2]))
+    return set_position(2, height + float(state.offset(state.pose.rotation)[2]))
 
 
 def _has_found(before: Frame, now: Frame) -> bool:
@@ -137,7 +137,7 @@ STEPS = (
         "Pose",
         "[role=slider][aria-label=y]",
         lambda before, now: before.state.pose != now.state.pose,
-        lambda now: SetPosition(1, now.state.position[1] + STRIDE * now.state.design.reach),
+        lambda now: set_position(1, now.state.position[1] + STRIDE * now.state.design.reach),
     ),
     TourStep(
         "Come close to a singularity",
@@ -147,7 +147,7 @@ STEPS = (
         "[role=slider][aria-label=z]",
         lambda _, now: now.verdict.kind != "clear",
         _approach,
-        after=GoHome(),
+        after=go_home(),
     ),
     TourStep(
         "Change the design",
@@ -155,7 +155,7 @@ STEPS = (
         "Design",
         "[role=slider][aria-label=a3x]",
         lambda before, now: before.state.design.variables != now.state.design.variables,
-        lambda now: SetVariable("a3x", GROWTH * now.state.design.variables[0]),
+        lambda now: set_variable("a3x", GROWTH * now.state.design.variables[0]),
     ),
     TourStep(
         "See the workspace",
@@ -173,8 +173,8 @@ STEPS = (
         "Optimise",
         "[data-ex=drawer] [data-press='optimise.start']",
         _has_found,
-        lambda _: StartRun(),
-        TakePaperProblem(),
+        lambda _: start_run(),
+        take_paper_problem(),
     ),
 )
 
@@ -286,11 +286,11 @@ class TourGuide(Runner):
                 for card in ended:
                     self._session.do(partial(self._take_back, card), who=card.client.client_id)
 
-    def _take_back(self, card: _Card, state: State) -> EndTour | None:
+    def _take_back(self, card: _Card, state: State) -> Act | None:
         """Return the action that takes back what a tour has changed; None if nothing is left."""
         if not card.changes:
             return None
-        end = EndTour(tuple(card.changes))
+        end = end_tour(tuple(card.changes))
         after = end.apply(state)
         opened = [before.base for before, shown in card.changes if before.base != shown.base]
         if opened and after.base != opened[0]:
@@ -307,7 +307,7 @@ class TourGuide(Runner):
                 card.close()
                 self._ended.append(card)
                 self._session.do(
-                    lambda state: CancelRun() if own_search(state, card.changes) else None, who=who
+                    lambda state: cancel_run() if own_search(state, card.changes) else None, who=who
                 )
 
     def _do(self, card: _Card, make: Callable[[State], Action | None]) -> None:

@@ -5,9 +5,8 @@ The last change of the design is shown by a ghost of what was before, and by the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from html import escape
-from typing import ClassVar
 
 import numpy as np
 import viser
@@ -21,7 +20,7 @@ from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.session.history import History, HistoryStep
 from explorer.app.session.session import REDO, UNDO, move_to
-from explorer.app.state.actions import Action, Open
+from explorer.app.state.actions import Action, action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.storage.session_file import decode_session
@@ -284,24 +283,17 @@ class ChangeScene(ScenePart):
         yield self._lines, "visible", is_visible
 
 
-@dataclass(frozen=True)
-class OpenSession(Open):
-    """Open the design of a session as it was left there, by the history of that session."""
-
-    template: ClassVar[str] = "Open the session of {design}"
-
-    history: History
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        return replace(self.history.restore(state).step.state, view=self.history.step.state.view)
+@action("Open the session of {design}", is_jump=True)
+def take_session(state: State, history: History) -> State:
+    """Open the design of a session as it was left there, unless one is being optimised."""
+    return replace(history.restore(state).step.state, view=history.step.state.view)
 
 
 def open_session(_: Services, data: bytes, name: str) -> tuple[Action, str]:
     """Return the action that opens the session in a file, and what it is; see `Opener`."""
     history = decode_session(decode_text(data).encode(), name)
     design = history.step.state.design
-    return OpenSession(design, history), f"The session of {design.name}; undo brings yours back."
+    return take_session(history), f"The session of {design.name}; undo brings yours back."
 
 
 HISTORY = Feature(

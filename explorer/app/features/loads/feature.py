@@ -20,7 +20,7 @@ from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetPose
+from explorer.app.state.moves import set_pose
 from explorer.app.state.state import State
 from explorer.app.state.view import Weighed
 from explorer.app.widgets.blocks import render
@@ -58,7 +58,7 @@ class ForcesPanel:
                 "in the scene can be dragged.",
                 ControlBinding(
                     lambda frame: frame.state.view.forces.force,
-                    lambda _, force: load.SetForce(force),
+                    lambda _, force: load.set_force(force),
                 ),
                 step=0.1,
             )
@@ -163,7 +163,7 @@ class ForcesPanel:
 
     def _go_to_nearest(self, _: State) -> Action | None:
         drawing = self._nearest.drawing
-        return None if drawing is None or drawing.pose is None else SetPose(drawing.pose)
+        return None if drawing is None or drawing.pose is None else set_pose(drawing.pose)
 
     def _turn_force(self, state: State) -> Action | None:
         size = math.hypot(*state.view.forces.force)

@@ -10,9 +10,10 @@ import numpy as np
 
 from explorer.app.scene.placing import round_step
 from explorer.app.session.feed import Feed, FeedOf
-from explorer.app.state.actions import Action
+from explorer.app.state.actions import action
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.measures.blocks.commands import LoadTopic, load_command
 from explorer.mechanism.design import Design
@@ -36,31 +37,24 @@ LEAST_FORCE = 1e-6
 FITTING = 0.45
 
 
-@dataclass(frozen=True)
-class SetForce(Action):
+def _force_words(_: State, force: Triple, *, keeps_scale: bool = False) -> str:
+    del keeps_scale
+    return f"Force {', '.join(format_number(value, 3) for value in force)} N"
+
+
+@action(_force_words)
+def set_force(state: State, force: Triple, *, keeps_scale: bool = False) -> State:
     """Set the force at the tool, along the axes of the base, in newtons.
 
     Its arrow keeps its scale while it is dragged.
+
+    Raises:
+        InputError: A force that is not finite.
     """
-
-    force: Triple
-    keeps_scale: bool = False
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: A force that is not finite.
-        """
-        forces = replace(state.view.forces, force=self.force)
-        if not self.keeps_scale:
-            forces = replace(forces, scale=fitting_scale(math.hypot(*self.force), forces.scale))
-        return replace(state, view=replace(state.view, forces=forces))
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        numbers = ", ".join(format_number(value, 3) for value in self.force)
-        return f"Force {numbers} N"
+    forces = replace(state.view.forces, force=force)
+    if not keeps_scale:
+        forces = replace(forces, scale=fitting_scale(math.hypot(*force), forces.scale))
+    return with_value(state, "view.forces", forces)
 
 
 def round_force(force: FloatArray, size: float) -> Triple:

@@ -12,9 +12,10 @@ import math
 import numpy as np
 
 from explorer.app.features.feature import Services, follow_drags, show
-from explorer.app.features.loads.load import Loads, SetForce, fitting_scale, round_force
+from explorer.app.features.loads.load import Loads, fitting_scale, round_force, set_force
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
+from explorer.app.state.actions import Action
 from explorer.app.state.state import State
 from explorer.app.widgets.blocks import share_colour
 from explorer.measures.blocks.block import Share
@@ -201,8 +202,8 @@ class LoadHandle(ScenePart):
         per_length = scale / (scene_scale(state) * state.design.reach)
         return round_force(per_length * (np.asarray(self.handle.position) - tool), scale)
 
-    def _pull(self, state: State) -> SetForce:
-        return SetForce(self.force(state), keeps_scale=True)
+    def _pull(self, state: State) -> Action:
+        return set_force(self.force(state), keeps_scale=True)
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that keep the gizmo at the tip of the arrow."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import msgspec
 import viser
@@ -13,10 +13,10 @@ from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.inputs.bindings import At, ControlBinding, item
 from explorer.app.inputs.ranges import Span, platform_span
-from explorer.app.state.actions import Action, Set
+from explorer.app.state.actions import Action, Set, action
 from explorer.app.state.frame import Frame
-from explorer.app.state.geometry import ClearMachine
-from explorer.app.state.moves import FULL_TURN
+from explorer.app.state.geometry import clear_machine
+from explorer.app.state.moves import angle_text
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.markup import note
@@ -49,29 +49,22 @@ EVERY_LENGTH, BOTH_TILTS = "Every length (± mm)", "Both tilts (± °)"
 TILTS = "design.tolerances.guide_tilt_deg"
 
 
-@dataclass(frozen=True)
-class SetToolAngle(Action):
-    """Set yaw, pitch or roll of the tool on the platform, 0 to 2, in degrees."""
+def _tool_angle_words(_: State, axis: int, value: float) -> str:
+    return f"tool {ANGLES[axis][0]} = {angle_text(value)}"
 
-    axis: int
-    value: float
 
-    def apply(self, state: State) -> State:
-        """Return the next state, which keeps the angles as they are.
+@action(_tool_angle_words)
+def set_tool_angle(state: State, axis: int, value: float) -> State:
+    """Set yaw, pitch or roll of the tool on the platform, 0 to 2, in degrees, which stay as set.
 
-        Raises:
-            InputError: The angle is not finite, or the design is being optimised.
-        """
-        state.check_free()
-        angles = with_value(state.tool_angles, str(self.axis), self.value)
-        quaternion = Pose.of_yaw_pitch_roll((0.0, 0.0, 0.0), angles).quaternion
-        changed = with_value(state, "design.tool.quaternion", quaternion)
-        return replace(changed, set_tool_angles=angles)
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        angle = format_number(self.value, 6, size=FULL_TURN)
-        return f"tool {ANGLES[self.axis][0]} = {angle}°"
+    Raises:
+        InputError: The angle is not finite, or the design is being optimised.
+    """
+    state.check_free()
+    angles = with_value(state.tool_angles, str(axis), value)
+    quaternion = Pose.of_yaw_pitch_roll((0.0, 0.0, 0.0), angles).quaternion
+    changed = with_value(state, "design.tool.quaternion", quaternion)
+    return replace(changed, set_tool_angles=angles)
 
 
 class MachinePanel:
@@ -88,7 +81,7 @@ class MachinePanel:
                 controls.slider(
                     f"tool {name} (°)",
                     f"Rotation of the tool on the platform {about}, in degrees.",
-                    item(lambda frame: frame.state.tool_angles, axis, SetToolAngle),
+                    item(lambda frame: frame.state.tool_angles, axis, set_tool_angle),
                     Span(-edge, edge, 0.1),
                 )
         with controls.folder("Payload ({unit}, kg, N)"):
@@ -127,7 +120,7 @@ class MachinePanel:
         controls.button(
             "Ideal machine",
             "Take tool, payload, actuators, struts, guide, tolerances and radii of the legs away.",
-            ClearMachine,
+            clear_machine,
         )
 
     def updates(self, frame: Frame) -> Updates:

@@ -23,7 +23,7 @@ from explorer.app.inputs.ranges import Intervals, Span
 from explorer.app.state import actions, geometry, moves
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import open_geometry, preset_of, set_unit
-from explorer.app.state.moves import SetMode
+from explorer.app.state.moves import set_mode
 from explorer.app.state.state import Hold, State
 from explorer.app.state.view import LengthName
 from explorer.app.widgets.buttons import figure
@@ -91,7 +91,7 @@ class MovePanel:
                 controls.slider(
                     name,
                     f"The {name} coordinate of b4 or of the tool point in the base frame.",
-                    item(lambda frame: frame.state.position, axis, moves.SetPosition),
+                    item(lambda frame: frame.state.position, axis, moves.set_position),
                     partial(ranges.position_span, axis=axis),
                     power=1,
                     visible=_is_by_position,
@@ -102,7 +102,7 @@ class MovePanel:
                 controls.slider(
                     f"{name} (°)",
                     f"Rotation of the platform {order}, in degrees.",
-                    item(lambda frame: frame.state.yaw_pitch_roll, axis, moves.SetAngle),
+                    item(lambda frame: frame.state.yaw_pitch_roll, axis, moves.set_angle),
                     Span(-edge, edge, 0.1),
                     visible=_is_by_position,
                 )
@@ -110,7 +110,7 @@ class MovePanel:
                 controls.slider(
                     label,
                     hint,
-                    item(lambda frame: frame.state.joints, joint, moves.SetJoint),
+                    item(lambda frame: frame.state.joints, joint, moves.set_joint),
                     partial(ranges.joint_span, joint=joint),
                     tinted=partial(closing_values, joint=joint),
                     closes_up=True,
@@ -123,7 +123,7 @@ class MovePanel:
                 "Use the nearest length",
                 "Move this leg to the nearest length that closes and stays clear of "
                 "singularities; the other legs stay as they are.",
-                moves.UseNearest,
+                moves.use_nearest,
                 icon=viser.Icon.MAGNET,
                 main=True,
                 keys=(Key("U"),),
@@ -131,7 +131,7 @@ class MovePanel:
             controls.button(
                 "Home pose",
                 "Return to the home pose, with which the design opens.",
-                moves.GoHome,
+                moves.go_home,
                 icon=viser.Icon.HOME,
                 keys=(Key("H"),),
             )
@@ -227,7 +227,7 @@ class DesignPanel:
             controls.button(
                 "Reset",
                 "Return to the design as it was opened.",
-                actions.Reset,
+                actions.reset_design,
                 icon=viser.Icon.RESTORE,
             )
         with controls.folder("Design variables ({unit})"):
@@ -238,7 +238,7 @@ class DesignPanel:
                     VARIABLE_HINTS[name],
                     ControlBinding(
                         lambda frame, index=index: frame.state.design.variables[index],
-                        lambda _, value, name=name: geometry.SetVariable(name, value),
+                        lambda _, value, name=name: geometry.set_variable(name, value),
                     ),
                     partial(ranges.variable_span, index=index),
                     power=1,
@@ -333,13 +333,13 @@ MECHANISM = Feature(
         StateCommand(
             "Pose › Next assembly mode",
             "Assemble the same leg lengths in the next of the eight ways.",
-            lambda state: SetMode((state.mode + 1) % len(MODES)),
+            lambda state: set_mode((state.mode + 1) % len(MODES)),
             keys=(Key("N"),),
         ),
         StateCommand(
             "Pose › Previous assembly mode",
             "Assemble the same leg lengths in the previous of the eight ways.",
-            lambda state: SetMode((state.mode - 1) % len(MODES)),
+            lambda state: set_mode((state.mode - 1) % len(MODES)),
             keys=(shift("N"),),
         ),
     ),

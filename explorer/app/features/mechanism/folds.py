@@ -27,7 +27,7 @@ from explorer.app.scene.shapes import (
     of_one_colour,
     write_label,
 )
-from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, SetFold
+from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, set_fold
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.folds import FOLDS
@@ -75,7 +75,7 @@ def add_fold_sliders(controls: Controls) -> None:
         controls.slider(
             name if index == 0 else f"{name} (°)",
             HINTS[index],
-            item(lambda frame: frame.folds, index, SetFold),
+            item(lambda frame: frame.folds, index, set_fold),
             partial(fold_span, index=index),
             power=int(index == 0),
             visible=lambda state: state.view.coordinates == "folds",

@@ -10,7 +10,7 @@ from explorer.app.features.feature import Services, follow_drags
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
 from explorer.app.state.actions import Action, Set
-from explorer.app.state.moves import SetPose
+from explorer.app.state.moves import set_pose
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.errors import InputError
@@ -97,7 +97,7 @@ class DragHandle(ScenePart):
     def _follow(self, state: State) -> Action:
         self._followed = self.handle.update_timestamp
         path, pose = handled_pose(state), self.pose(state)
-        return SetPose(pose) if path == "pose" else Set(path, pose, "Pose of the path", "dragged")
+        return set_pose(pose) if path == "pose" else Set(path, pose, "Pose of the path", "dragged")
 
 
 def handled_pose(state: State) -> str:

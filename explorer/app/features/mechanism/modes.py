@@ -20,7 +20,7 @@ from explorer.app.scene.shapes import (
     write_label,
 )
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetMode
+from explorer.app.state.moves import set_mode
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chips, StateCommand, turn
 from explorer.app.widgets.markup import box
@@ -55,7 +55,7 @@ class ModesPanel:
         self._present = gui.add_html("")
         with gui.add_folder("8 modes", expand_by_default=False):
             self._table = gui.add_html("")
-        services.do_on_press(GO, lambda mode: SetMode(int(mode)), set("01234567"))
+        services.do_on_press(GO, lambda mode: set_mode(int(mode)), set("01234567"))
         ghosts = StateCommand(
             f"Pose › {GHOSTS_LABEL}",
             "Draw the seven other ways to assemble the same leg lengths.",

@@ -7,13 +7,12 @@ During a run all actions that would change the design are refused by
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import msgspec
 
 from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, problem_of
-from explorer.app.state.actions import Action, Open, Set
+from explorer.app.state.actions import Set, action, open_design
 from explorer.app.state.geometry import with_machine
 from explorer.app.state.moves import move_to
 from explorer.app.state.parts import parts_kept_on_open, with_value
@@ -40,169 +39,129 @@ class SetObjective(Set):
         return super().apply(with_value(state, "optimisation.request.volume", None))
 
 
-@dataclass(frozen=True)
-class StartRun(Action):
-    """Start the search for the best design."""
+@action("Start run")
+def start_run(state: State) -> State:
+    """Start the search for the best design; its workspace is shown.
 
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse if the limits rule out the demands."""
-        optimisation = Optimisation.of(state)
-        if optimisation.is_on:
-            return state
-        impossible = find_refusals(state)
-        if impossible:
-            raise NoAnswerError("; ".join(refusal.message for refusal in impossible))
-        own = with_value(state, "optimisation", Optimisation(optimisation.request))
-        if optimisation.undecided is not None:
-            # A result that is not accepted is not yet a design of the user.
-            own = optimisation.undecided.own
-        run = SearchRun(
-            number=optimisation.count + 1,
-            problem=problem_of(state),
-            starts=optimisation.request.starts,
-            own=own,
-        )
-        # The run shows its workspace.
-        shown = with_value(state, "view.workspace.solid", True)
-        searching = Optimisation(optimisation.request, run, run.number)
-        return with_value(shown, "optimisation", searching)
-
-
-@dataclass(frozen=True)
-class TakePaperProblem(Action):
-    """Open the paper's initial design with the box of its optimum, and request its volume."""
-
-    template: ClassVar[str] = "The paper's problem"
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        start = defaults.paper_start()
-        # The paper's legs are lines.
-        design = with_machine(start, state.design, state.view)
-        after = Open(design.with_limits(leg_radii=start.limits.leg_radii)).apply(state)
-        return with_value(after, "optimisation.request", PAPER_REQUEST)
+    Raises:
+        NoAnswerError: The limits rule out the demands.
+    """
+    optimisation = Optimisation.of(state)
+    if optimisation.is_on:
+        return state
+    impossible = find_refusals(state)
+    if impossible:
+        raise NoAnswerError("; ".join(refusal.message for refusal in impossible))
+    own = with_value(state, "optimisation", Optimisation(optimisation.request))
+    if optimisation.undecided is not None:
+        # A result that is not accepted is not yet a design of the user.
+        own = optimisation.undecided.own
+    run = SearchRun(
+        number=optimisation.count + 1,
+        problem=problem_of(state),
+        starts=optimisation.request.starts,
+        own=own,
+    )
+    shown = with_value(state, "view.workspace.solid", True)
+    return with_value(shown, "optimisation", Optimisation(optimisation.request, run, run.number))
 
 
-@dataclass(frozen=True)
-class LiftLimit(Action):
-    """Take a limit out of the design, or tie maximum lengths to the reach; see `without_limit`."""
+@action("The paper's problem")
+def take_paper_problem(state: State) -> State:
+    """Open the paper's initial design with the box of its optimum, and request its volume.
 
-    template: ClassVar[str] = "{action.title}"
-
-    limit: str
-
-    @property
-    def title(self) -> str:
-        """The label, such as "Lift the box"."""
-        if self.limit == MAXIMA:
-            return "Tie all maximum lengths to the reach"
-        name, _, end = self.limit.partition(" ")
-        if end == "maximum":
-            return f"Tie the maximum of {name} to the reach"
-        return f"Lift the {LIMIT_NAMES.get(name, name)}"
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse during a run, or if the design has no such limit."""
-        state.check_free()
-        design = conflicts.without_limit(state.design, self.limit)
-        if design is None:
-            raise InputError(f"the design has no limit named {self.limit!r} to lift")
-        return replace(state, design=design)
+    The action is refused while the design is being optimised.
+    """
+    start = defaults.paper_start()
+    # The paper's legs are lines.
+    design = with_machine(start, state.design, state.view)
+    after = open_design(design.with_limits(leg_radii=start.limits.leg_radii)).apply(state)
+    return with_value(after, "optimisation.request", PAPER_REQUEST)
 
 
-@dataclass(frozen=True)
-class CancelRun(Action):
+def lift_words(limit: str) -> str:
+    """Return the label of the action that lifts a limit, such as "Lift the box"."""
+    if limit == MAXIMA:
+        return "Tie all maximum lengths to the reach"
+    name, _, end = limit.partition(" ")
+    if end == "maximum":
+        return f"Tie the maximum of {name} to the reach"
+    return f"Lift the {LIMIT_NAMES.get(name, name)}"
+
+
+def _lift_words(_: State, limit: str) -> str:
+    return lift_words(limit)
+
+
+@action(_lift_words)
+def lift_limit(state: State, limit: str) -> State:
+    """Take a limit out of the design, or tie maximum lengths to the reach; see `without_limit`.
+
+    Raises:
+        InputError: A run goes on, or the design has no such limit.
+    """
+    state.check_free()
+    design = conflicts.without_limit(state.design, limit)
+    if design is None:
+        raise InputError(f"the design has no limit named {limit!r} to lift")
+    return replace(state, design=design)
+
+
+@action("Cancel run")
+def cancel_run(state: State) -> State:
     """Cancel the run."""
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        if not Optimisation.of(state).is_on:
-            return state
-        return with_value(state, "optimisation.run.phase", "cancelling")
+    is_on = Optimisation.of(state).is_on
+    return with_value(state, "optimisation.run.phase", "cancelling") if is_on else state
 
 
-@dataclass(frozen=True)
-class AddIterates(Action):
-    """Add iterates to a run, and draw the last one."""
-
-    continues: ClassVar[bool] = True
-
-    number: int
-    iterates: tuple[Iterate, ...]
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        run = _running(state, self.number)
-        if run is None or not self.iterates:
-            return state
-        after = with_value(state, "optimisation.run.iterates", run.iterates + self.iterates)
-        return _with_design(after, self.iterates[-1].design)
+@action("", continues=True)
+def add_iterates(state: State, number: int, iterates: tuple[Iterate, ...]) -> State:
+    """Add iterates to the run with a number, and draw the last one."""
+    run = _running(state, number)
+    if run is None or not iterates:
+        return state
+    after = with_value(state, "optimisation.run.iterates", run.iterates + iterates)
+    return _with_design(after, iterates[-1].design)
 
 
-@dataclass(frozen=True)
-class EndRun(Action):
+@action("Optimise: {design}")
+def end_run(
+    state: State, number: int, verdict: SearchResult, iterates: tuple[Iterate, ...] = ()
+) -> State:
     """End a run and show its result, or without one the user's own design."""
-
-    template: ClassVar[str] = "Optimise: {design}"
-
-    number: int
-    verdict: SearchResult
-    iterates: tuple[Iterate, ...] = ()
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        state = AddIterates(self.number, self.iterates).apply(state)
-        run = _running(state, self.number)
-        if run is None:
-            return state
-        ended = replace(run, phase="ended", verdict=self.verdict)
-        after = with_value(state, "optimisation.run", ended)
-        if self.verdict.best is None:
-            return _restore_own(after, run.own)
-        return _with_design(after, _rename(self.verdict.best.design))
+    state = add_iterates(number, iterates).apply(state)
+    run = _running(state, number)
+    if run is None:
+        return state
+    after = with_value(state, "optimisation.run", replace(run, phase="ended", verdict=verdict))
+    if verdict.best is None:
+        return _restore_own(after, run.own)
+    return _with_design(after, _rename(verdict.best.design))
 
 
-@dataclass(frozen=True)
-class Compare(Action):
-    """Add the comparison of the user's own design and the new one."""
-
-    continues: ClassVar[bool] = True
-
-    number: int
-    comparison: tuple[Measurements, Measurements]
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        run = Optimisation.of(state).run
-        if run is None or run.number != self.number:
-            return state
-        return with_value(state, "optimisation.run.comparison", self.comparison)
+@action("", continues=True)
+def compare(state: State, number: int, comparison: tuple[Measurements, Measurements]) -> State:
+    """Add the comparison of the user's own design and that of the run with a number."""
+    run = Optimisation.of(state).run
+    if run is None or run.number != number:
+        return state
+    return with_value(state, "optimisation.run.comparison", comparison)
 
 
-@dataclass(frozen=True)
-class Accept(Action):
+@action("Accept {design}")
+def accept(state: State) -> State:
     """Make the result the design of the user."""
-
-    template: ClassVar[str] = "Accept {design}"
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        is_undecided = Optimisation.of(state).undecided is not None
-        return with_value(state, "optimisation.run.accepted", True) if is_undecided else state
+    is_undecided = Optimisation.of(state).undecided is not None
+    return with_value(state, "optimisation.run.accepted", True) if is_undecided else state
 
 
-@dataclass(frozen=True)
-class Revert(Action):
+@action("Revert to {design}")
+def revert(state: State) -> State:
     """Return to the user's own design in its pose, exactly."""
-
-    template: ClassVar[str] = "Revert to {design}"
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        run = Optimisation.of(state).undecided
-        if run is None:
-            return state
-        return _restore_own(with_value(state, "optimisation.run", None), run.own)
+    run = Optimisation.of(state).undecided
+    return (
+        state if run is None else _restore_own(with_value(state, "optimisation.run", None), run.own)
+    )
 
 
 def _running(state: State, number: int) -> SearchRun | None:

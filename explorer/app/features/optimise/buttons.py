@@ -36,40 +36,40 @@ BUTTONS: Mapping[str, StateCommand] = {
     START: StateCommand(
         "Optimise › Optimise",
         "Search for the best design from the present one; its limits hold throughout.",
-        lambda _: actions.StartRun(),
+        lambda _: actions.start_run(),
         is_ready=lambda state: not (Optimisation.of(state).is_on or work.find_refusals(state)),
         keys=(Key("O"),),
     ),
     CANCEL: StateCommand(
         "Optimise › Cancel",
         "End the search, and keep the best so far.",
-        lambda _: actions.CancelRun(),
+        lambda _: actions.cancel_run(),
         is_ready=_is_running,
         keys=(shift("O"),),
     ),
     ACCEPT: StateCommand(
         "Optimise › Accept",
         "Keep the new design.",
-        lambda _: actions.Accept(),
+        lambda _: actions.accept(),
         is_ready=_is_undecided,
     ),
     REVERT: StateCommand(
         "Optimise › Revert",
         "Return to your own design in its pose.",
-        lambda _: actions.Revert(),
+        lambda _: actions.revert(),
         is_ready=_is_undecided,
     ),
     PAPER: StateCommand(
         "Optimise › The paper's problem",
         "Open the paper's initial design within the box of its optimum, and ask for its volume of "
         "8,000 cm³ with a clearance of 2 mm; one undo brings your design back.",
-        lambda _: actions.TakePaperProblem(),
+        lambda _: actions.take_paper_problem(),
         is_ready=lambda state: not Optimisation.of(state).is_on,
     ),
     LIFT: StateCommand(
         "Optimise › Lift the limit",
         "Take the limit that prevents the search out of the design; one undo brings it back.",
-        lambda state: actions.LiftLimit(next(iter(work.liftable_limits(state)), "")),
+        lambda state: actions.lift_limit(next(iter(work.liftable_limits(state)), "")),
         is_ready=lambda state: bool(work.liftable_limits(state)),
     ),
 }
@@ -81,7 +81,7 @@ def add_buttons(services: Services) -> None:
 
     def press(name: str, value: str, client: viser.ClientHandle) -> None:
         is_named = name == LIFT and value
-        change = actions.LiftLimit(value) if is_named else BUTTONS[name].change
+        change = actions.lift_limit(value) if is_named else BUTTONS[name].change
         services.session.do(change, who=client.client_id)
 
     for name, each in BUTTONS.items():

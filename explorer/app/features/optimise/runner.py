@@ -11,7 +11,7 @@ import threading
 import time
 
 from explorer.app.features.feature import Runner, Services
-from explorer.app.features.optimise.actions import AddIterates, CancelRun, Compare, EndRun
+from explorer.app.features.optimise.actions import add_iterates, cancel_run, compare, end_run
 from explorer.app.features.optimise.state import REACHED, Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import optimise
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
@@ -88,7 +88,7 @@ class Optimiser(Runner):
     def finish(self) -> None:
         """Cancel a search that goes on, which keeps its best iterate."""
         if Optimisation.of(self._session.state).is_on:
-            self._session.do(CancelRun())
+            self._session.do(cancel_run())
             deadline = time.monotonic() + LONGEST_END
             while Optimisation.of(self._session.state).is_on and time.monotonic() < deadline:
                 time.sleep(WAIT_SECONDS)
@@ -144,10 +144,10 @@ class Optimiser(Runner):
             taken = count if is_over else math.ceil((len(run.iterates) + count) / STEPS)
             iterates, self._waiting = tuple(self._waiting[:taken]), self._waiting[taken:]
             if not is_over or self._ending is None:
-                return AddIterates(run.number, iterates)
+                return add_iterates(run.number, iterates)
             self._number = 0
             result = result_of(run, self._ending, run.iterates + iterates)
-            return EndRun(run.number, result, iterates)
+            return end_run(run.number, result, iterates)
 
     def _compare(self, run: SearchRun) -> None:
         best = run.best
@@ -155,7 +155,7 @@ class Optimiser(Runner):
             self._jobs.start(
                 compare_designs,
                 (run.problem, run.own.design, best.design),
-                lambda both: self._session.do(Compare(run.number, both)),
+                lambda both: self._session.do(compare(run.number, both)),
                 key=compare_designs,
                 process=SEARCH,
                 died=DIED,

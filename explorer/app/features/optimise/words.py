@@ -9,7 +9,7 @@ from html import escape
 
 from explorer.app.features.compare.table import ComparedDesign, measure_row
 from explorer.app.features.optimise import buttons, work
-from explorer.app.features.optimise.actions import LiftLimit
+from explorer.app.features.optimise.actions import lift_words
 from explorer.app.features.optimise.state import REACHED, Optimisation, SearchResult, SearchRun
 from explorer.app.state.state import State
 from explorer.app.state.view import View
@@ -124,7 +124,7 @@ def search_words(state: State) -> str:
         buttons.button(
             buttons.LIFT,
             state,
-            words=LiftLimit(limit).title,
+            words=lift_words(limit),
             value=limit,
             is_main=limit == limits[0],
         )

@@ -68,7 +68,7 @@ class OrientationPanel:
             controls.slider(
                 f"{name.capitalize()} (°)",
                 HINTS[axis],
-                item(lambda frame: frame.state.tilt_torsion, axis, work.SetTiltTorsion),
+                item(lambda frame: frame.state.tilt_torsion, axis, work.set_tilt_torsion),
                 SPANS[axis],
                 disabled=None if axis else lambda state: state.tilt_torsion.tilt < LEVEL,
             )
@@ -106,7 +106,7 @@ class OrientationPanel:
 def _tilt(text: str) -> Action | None:
     """Return the action that tilts the platform as a page sent it, (azimuth, tilt) in degrees."""
     angles: tuple[float, float] | None = decode_text(text, _TILT)
-    return None if angles is None else work.GoToTilt(*angles)
+    return None if angles is None else work.go_to_tilt(*angles)
 
 
 def summary(

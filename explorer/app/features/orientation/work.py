@@ -9,9 +9,9 @@ from typing import TypeAlias
 import numpy as np
 
 from explorer.app.session.feed import Feed, FeedOf, watch_of
-from explorer.app.state.actions import Action
+from explorer.app.state.actions import action
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import move_to
+from explorer.app.state.moves import angle_text, move_to
 from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.jobs.process import Channel
@@ -40,59 +40,43 @@ from explorer.workspace.orientations.tilts import (
 from explorer.workspace.workspace import Workspace
 
 ANGLES = ("azimuth", "tilt", "torsion")
-FULL_TURN = 360.0
 
 
-@dataclass(frozen=True)
-class SetTiltTorsion(Action):
+def _angle_words(_: State, axis: int, value: float) -> str:
+    return f"{ANGLES[axis]} = {angle_text(value)}"
+
+
+@action(_angle_words)
+def set_tilt_torsion(state: State, axis: int, value: float) -> State:
     """Set azimuth, tilt or torsion, 0 to 2, in degrees."""
-
-    axis: int
-    value: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return _tilt_to(state, state.tilt_torsion._replace(**{ANGLES[self.axis]: self.value}))
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        return f"{ANGLES[self.axis]} = {format_number(self.value, 6, size=FULL_TURN)}°"
+    return _tilt_to(state, state.tilt_torsion._replace(**{ANGLES[axis]: value}))
 
 
-@dataclass(frozen=True)
-class GoToTilt(Action):
+def _tilt_words(after: State, azimuth: float, _: float) -> str:
+    tilt = format_number(after.tilt_torsion.tilt, 4)
+    return f"Tilt {tilt}° towards {format_number(azimuth, 4)}°"
+
+
+@action(_tilt_words)
+def go_to_tilt(state: State, azimuth: float, tilt: float) -> State:
     """Tilt the platform in an azimuth at its present torsion, as far as the limits allow it.
 
-    Angles are in degrees.
+    Angles are in degrees. The next state has a remark if a limit ends the tilts before.
+
+    Raises:
+        InputError: Tilt zero breaks a limit itself, so that no tilt is reached from it.
     """
-
-    azimuth: float
-    tilt: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state, with a remark if a limit ends the tilts before.
-
-        Raises:
-            InputError: Tilt zero breaks a limit itself, so that no tilt is reached from it.
-        """
-        torsion = state.tilt_torsion.torsion
-        border = tilt_map(state.design, state.position, torsion, [self.azimuth], state.tool)
-        (most,), (limit,) = border.tilts.tolist(), border.limits
-        if math.isnan(most):
-            raise InputError(f"no tilt is possible here: tilt zero is beyond the limit {limit}")
-        if self.tilt <= most:
-            return _tilt_to(state, TiltTorsion(self.azimuth, self.tilt, torsion))
-        after = _tilt_to(state, TiltTorsion(self.azimuth, max(most - INSIDE, 0.0), torsion))
-        azimuth = format_number(self.azimuth, 4)
-        words = f"Tilts towards {azimuth}° end at {most:.1f}°, by {limit}: no farther."
-        return replace(after, taken=(after.joints, words))
-
-    def describe(self, after: State) -> str:
-        """Return the words for the action."""
-        tilt, azimuth = (
-            format_number(angle, 4) for angle in (after.tilt_torsion.tilt, self.azimuth)
-        )
-        return f"Tilt {tilt}° towards {azimuth}°"
+    torsion = state.tilt_torsion.torsion
+    border = tilt_map(state.design, state.position, torsion, [azimuth], state.tool)
+    (most,), (limit,) = border.tilts.tolist(), border.limits
+    if math.isnan(most):
+        raise InputError(f"no tilt is possible here: tilt zero is beyond the limit {limit}")
+    if tilt <= most:
+        return _tilt_to(state, TiltTorsion(azimuth, tilt, torsion))
+    after = _tilt_to(state, TiltTorsion(azimuth, max(most - INSIDE, 0.0), torsion))
+    towards = format_number(azimuth, 4)
+    words = f"Tilts towards {towards}° end at {most:.1f}°, by {limit}: no farther."
+    return replace(after, taken=(after.joints, words))
 
 
 def _tilt_to(state: State, angles: TiltTorsion) -> State:

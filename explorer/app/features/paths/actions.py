@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import ClassVar
 
 from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.features.paths.state import Journey, Paths, StopAt, journey_of
 from explorer.app.features.paths.stops import poses_of, stops_of
-from explorer.app.state.actions import Action, Set
+from explorer.app.state.actions import Set, action
 from explorer.app.state.moves import move_to
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
@@ -25,44 +24,37 @@ from explorer.paths.planning import plan_path
 from explorer.statics.loaded import LoadedPose
 
 
-@dataclass(frozen=True)
-class Go(Action):
-    """Play the straight path along the poses of the list, or request one without a singularity."""
+def _go_words(after: State) -> str:
+    journey = journey_of(after)
+    return "Plan a path" if journey is None else journey.title
 
-    def apply(self, state: State) -> State:
-        """Return the next state: at the start of the path and playing, or planning it.
 
-        Raises:
-            InputError: All poses are the same, or one is a mode that the present leg lengths do
-                not have.
-        """
-        # A mode that follows the present one would be another one once the platform moves.
-        stops, poses = stops_of(state), poses_of(state)
-        if not StraightMoves.along(poses).have_length(state.design.reach).any():
-            raise InputError(
-                "the poses of the path are the same pose: choose another goal, or press Play to "
-                "see the last path again"
-            )
-        if Paths.of(state).kind == "planned":
-            after = _with(state, stops=stops, chosen=None, problem=None, journey=None)
-            return _with(after, request=Paths.of(state).request + 1, planning=poses)
-        pauses, start = tuple(stop.pause for stop in stops), stops[0].at
-        ends = f"{_words(start).capitalize()} to {_words(stops[-1].at)}"
-        title = ends if len(stops) == 2 else f"Path of {len(stops)} poses"
-        path = Journey(
-            *("straight", title, state.design, poses),
-            is_playing=True,
-            tool=state.tool,
-            pauses=pauses,
+@action(_go_words)
+def go(state: State) -> State:
+    """Play the straight path along the poses of the list, or request one without a singularity.
+
+    Raises:
+        InputError: All poses are the same, or one is a mode that the present leg lengths do not
+            have.
+    """
+    # A mode that follows the present one would be another one once the platform moves.
+    stops, poses = stops_of(state), poses_of(state)
+    if not StraightMoves.along(poses).have_length(state.design.reach).any():
+        raise InputError(
+            "the poses of the path are the same pose: choose another goal, or press Play to see "
+            "the last path again"
         )
-        after = _with(state, stops=stops, chosen=None, problem=None, planning=None, journey=path)
-        after = move_to(after, poses[0])
-        return replace(after, mode=start) if isinstance(start, int) else after
-
-    def describe(self, after: State) -> str:
-        """Return which path was played or requested."""
-        journey = journey_of(after)
-        return "Plan a path" if journey is None else journey.title
+    cleared = _with(state, stops=stops, chosen=None, problem=None, planning=None, journey=None)
+    if Paths.of(state).kind == "planned":
+        return _with(cleared, request=Paths.of(state).request + 1, planning=poses)
+    pauses, start = tuple(stop.pause for stop in stops), stops[0].at
+    ends = f"{_words(start).capitalize()} to {_words(stops[-1].at)}"
+    title = ends if len(stops) == 2 else f"Path of {len(stops)} poses"
+    path = Journey(
+        *("straight", title, state.design, poses), is_playing=True, tool=state.tool, pauses=pauses
+    )
+    after = move_to(_with(cleared, journey=path), poses[0])
+    return replace(after, mode=start) if isinstance(start, int) else after
 
 
 @dataclass(frozen=True)
@@ -85,82 +77,55 @@ def _words(at: StopAt) -> str:
     return "typed pose" if isinstance(at, Pose) else f"mode {at}"
 
 
-@dataclass(frozen=True)
-class SetPathTime(Action):
-    """Go to a time on the path, in seconds."""
-
-    seconds: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse without a path, or a time that is not finite."""
-        journey = _journey(state)
-        if not math.isfinite(self.seconds):
-            raise InputError(f"the time must be finite; got {self.seconds}")
-        at = min(max(self.seconds, 0.0), journey.trajectory.duration)
-        return _go_along(state, replace(journey, at=at))
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        return f"Path at {format_number(self.seconds, 3)} s"
+def _time_words(_: State, seconds: float) -> str:
+    return f"Path at {format_number(seconds, 3)} s"
 
 
-@dataclass(frozen=True)
-class Play(Action):
-    """Play the path, from its start if it is at its end; or pause it."""
-
-    continues: ClassVar[bool] = True
-
-    on: bool
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse without a path."""
-        journey = _journey(state)
-        if not self.on:
-            return _with(state, journey=replace(journey, is_playing=False))
-        at = journey.at if journey.at < journey.trajectory.duration else 0.0
-        return _go_along(state, replace(journey, at=at, is_playing=True))
+@action(_time_words)
+def set_path_time(state: State, seconds: float) -> State:
+    """Go to a time on the path, in seconds; refuse without a path, or a time that is not finite."""
+    journey = _journey(state)
+    if not math.isfinite(seconds):
+        raise InputError(f"the time must be finite; got {seconds}")
+    at = min(max(seconds, 0.0), journey.trajectory.duration)
+    return _go_along(state, replace(journey, at=at))
 
 
-@dataclass(frozen=True)
-class AdvanceJourney(Action):
+@action("", continues=True)
+def play(state: State, on: bool) -> State:
+    """Play the path, from its start if it is at its end, or pause it; refuse without a path."""
+    journey = _journey(state)
+    if not on:
+        return _with(state, journey=replace(journey, is_playing=False))
+    at = journey.at if journey.at < journey.trajectory.duration else 0.0
+    return _go_along(state, replace(journey, at=at, is_playing=True))
+
+
+@action("", continues=True)
+def advance_journey(state: State, seconds: float) -> State:
     """Advance a path that is playing by some seconds of playback, until its end."""
-
-    continues: ClassVar[bool] = True
-
-    seconds: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        journey = journey_of(state)
-        if journey is None or not journey.is_playing:
-            return state
-        passed = self.seconds / Paths.of(state).slower
-        at = min(journey.at + passed, journey.trajectory.duration)
-        after = replace(journey, at=at, is_playing=at < journey.trajectory.duration)
-        return _go_along(state, after)
+    journey = journey_of(state)
+    if journey is None or not journey.is_playing:
+        return state
+    end = journey.trajectory.duration
+    at = min(journey.at + seconds / Paths.of(state).slower, end)
+    return _go_along(state, replace(journey, at=at, is_playing=at < end))
 
 
-@dataclass(frozen=True)
-class TakePlan(Action):
-    """Accept the path of a request, or why there is none, unless a newer one has replaced it."""
+@action("", continues=True)
+def take_plan(state: State, request: int, journey: Journey | None, problem: str | None) -> State:
+    """Accept the path of a request, or why there is none, unless a newer one has replaced it.
 
-    continues: ClassVar[bool] = True
-
-    request: int
-    journey: Journey | None
-    problem: str | None
-
-    def apply(self, state: State) -> State:
-        """Return the next state, at the start of the path."""
-        paths = Paths.of(state)
-        if self.request != paths.request or not paths.is_planning:
-            return state
-        problem = self.problem
-        if self.journey is not None and self.journey.design != state.design:
-            problem = "the design has changed meanwhile; press Go again"
-        after = _with(state, planning=None, problem=problem, journey=self.journey)
-        journey = journey_of(after)
-        return after if journey is None else move_to(after, journey.pose)
+    The platform goes to the start of the path.
+    """
+    paths = Paths.of(state)
+    if request != paths.request or not paths.is_planning:
+        return state
+    if journey is not None and journey.design != state.design:
+        problem = "the design has changed meanwhile; press Go again"
+    after = _with(state, planning=None, problem=problem, journey=journey)
+    own = journey_of(after)
+    return after if own is None else move_to(after, own.pose)
 
 
 def _journey(state: State) -> Journey:

@@ -84,7 +84,7 @@ class StopsEditor:
             visible=_is_chosen,
         )
         changes: dict[str, Callable[[State, int], Action | None]] = {
-            "choose": lambda state, i: stops.ChooseStop(None if stops.chosen_of(state) == i else i),
+            "choose": lambda _, i: stops.choose_stop(i),
             "copy": stops.copy_stop,
             "lift": stops.lift_stop,
             "remove": stops.remove_stop,

@@ -8,13 +8,14 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, Tab, show
-from explorer.app.features.paths.actions import AdvanceJourney, Play, TakePlan, plan
+from explorer.app.features.paths.actions import advance_journey, plan, play, take_plan
 from explorer.app.features.paths.panel import PathsPanel, slow_words
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
 from explorer.app.features.paths.stops import stops_of
 from explorer.app.features.paths.work import DRIVES_FEED
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import activity, press_button
@@ -142,7 +143,7 @@ class PathRunner(Runner):
     def _finish(self, request: int, journey: Journey | None, problem: str | None) -> None:
         if request == self._request:
             self._job = None
-        self._session.do(TakePlan(request, journey, problem))
+        self._session.do(take_plan(request, journey, problem))
 
     def _tick(self) -> bool:
         # A step that still waits will cover the time until the session handles it.
@@ -150,10 +151,10 @@ class PathRunner(Runner):
             self._session.post(self, self._advance)
         return self._is_playing
 
-    def _advance(self, _: State) -> AdvanceJourney:
+    def _advance(self, _: State) -> Action:
         now = time.monotonic()
         passed, self._advanced_at = min(now - self._advanced_at, LONGEST_STEP), now
-        return AdvanceJourney(passed)
+        return advance_journey(passed)
 
 
 PATHS = Feature(
@@ -173,7 +174,7 @@ PATHS = Feature(
         StateCommand(
             "Paths › Play or pause",
             "Play the present path, or pause it.",
-            lambda state: Play(not is_playing(state)),
+            lambda state: play(not is_playing(state)),
             is_ready=lambda state: journey_of(state) is not None,
             keys=(Key("P"),),
         ),

@@ -83,7 +83,7 @@ class PathsPanel:
             self.go = self._controls.button(
                 "Go",
                 "Make the path along the poses, and play it.",
-                actions.Go,
+                actions.go,
                 icon=viser.Icon.ROUTE,
                 main=True,
                 keys=(Key("J"),),
@@ -126,7 +126,7 @@ class PathsPanel:
                 "Time on the path.",
                 ControlBinding(
                     lambda frame: journey.at if (journey := journey_of(frame.state)) else 0.0,
-                    lambda _, value: actions.SetPathTime(value),
+                    lambda _, value: actions.set_path_time(value),
                 ),
                 _time_span,
                 visible=lambda state: journey_of(state) is not None,
@@ -134,7 +134,7 @@ class PathsPanel:
             self._margins = gui.add_html("", visible=False)
         with gui.add_folder("Drives"):
             self._drives = gui.add_html("")
-        services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
+        services.do_on_press("paths.play", lambda on: actions.play(on == "on"), ("on", "off"))
         services.do_on_press("paths.cancel", lambda _: CANCEL)
         self._clear = services.link(
             "paths.clear",

@@ -6,14 +6,13 @@ to the mode beyond δ1 = 0. Assembly modes are those of the present leg lengths.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
 from explorer.app.features.paths.state import MOST_STOPS, Paths, Stop, StopAt, journey_of
-from explorer.app.state.actions import Action
+from explorer.app.state.actions import Act, action
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import Joints, State, joints_of
 from explorer.errors import InputError
@@ -25,42 +24,23 @@ from explorer.mechanism.pose import Pose
 SAME = 1e-9
 
 
-@dataclass(frozen=True)
-class SetStops(Action):
+def _stops_words(_: State, stops: tuple[Stop, ...], chosen: int | None, text: str) -> str:
+    del stops, chosen
+    return text
+
+
+@action(_stops_words)
+def set_stops(state: State, stops: tuple[Stop, ...], chosen: int | None, text: str) -> State:
     """Set the poses of the next path, and which of them is edited."""
-
-    stops: tuple[Stop, ...]
-    chosen: int | None
-    text: str
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        paths = replace(Paths.of(state), stops=self.stops, chosen=self.chosen, problem=None)
-        return with_value(state, "paths", paths)
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        return self.text
+    del text
+    paths = replace(Paths.of(state), stops=stops, chosen=chosen, problem=None)
+    return with_value(state, "paths", paths)
 
 
-@dataclass(frozen=True)
-class SetStop(SetStops):
-    """Set one pose of the next path; all numbers that are set of it are one step."""
-
-    repeats: ClassVar[bool] = True
-
-
-@dataclass(frozen=True)
-class ChooseStop(Action):
-    """Choose the pose of the list that is edited; None for none."""
-
-    continues: ClassVar[bool] = True
-
-    chosen: int | None
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return with_value(state, "paths.chosen", self.chosen)
+@action("", continues=True)
+def choose_stop(state: State, index: int) -> State:
+    """Choose the pose of the list that is edited; if it is that one, none is any more."""
+    return with_value(state, "paths.chosen", None if chosen_of(state) == index else index)
 
 
 def stops_of(state: State) -> tuple[Stop, ...]:
@@ -118,24 +98,24 @@ def pinned_stops(state: State) -> tuple[Stop, ...]:
     return tuple(replace(s, at=state.pose) if s.at is None else s for s in stops)
 
 
-def add_present(state: State) -> SetStops:
+def add_present(state: State) -> Act:
     """Return the action that adds the present pose after the edited one, or as the last."""
     stops, chosen = pinned_stops(state), chosen_of(state)
     if Paths.of(state).stops == (Stop(),):
-        return SetStops(stops, None, "Pose 1 of the path: present pose")
+        return set_stops(stops, None, "Pose 1 of the path: present pose")
     at = len(stops) if chosen is None else min(chosen + 1, len(stops))
     # None is edited, so that the handle in the scene is that of the platform.
-    return replace(_insert(stops, at, Stop(state.pose), "present pose"), chosen=None)
+    return _insert(stops, at, Stop(state.pose), "present pose", is_edited=False)
 
 
-def copy_stop(state: State, index: int) -> SetStops:
+def copy_stop(state: State, index: int) -> Act:
     """Return the action that adds a pose of the list as numbers behind it, to be changed."""
     at = stops_of(state)[index].at
     stops = pinned_stops(state) if index < len(Paths.of(state).stops) else stops_of(state)
     return _insert(stops, index + 1, Stop(pose_of(state, at)), f"as pose {index + 1}")
 
 
-def close_path(state: State) -> SetStops | None:
+def close_path(state: State) -> Act | None:
     """Return the action that ends the path in its first pose; None for a single pose."""
     stops = pinned_stops(state)
     if len(stops) < 2 or stops[-1].at == stops[0].at:
@@ -143,37 +123,42 @@ def close_path(state: State) -> SetStops | None:
     return _insert(stops, len(stops), Stop(stops[0].at), "as pose 1")
 
 
-def _insert(stops: tuple[Stop, ...], at: int, stop: Stop, words: str) -> SetStops:
-    return SetStops((*stops[:at], stop, *stops[at:]), at, f"Pose {at + 1} of the path: {words}")
+def _insert(
+    stops: tuple[Stop, ...], at: int, stop: Stop, words: str, *, is_edited: bool = True
+) -> Act:
+    text, chosen = f"Pose {at + 1} of the path: {words}", at if is_edited else None
+    return set_stops((*stops[:at], stop, *stops[at:]), chosen, text)
 
 
-def remove_stop(state: State, index: int) -> SetStops:
+def remove_stop(state: State, index: int) -> Act:
     """Return the action that removes a pose; without one the path starts in the present pose."""
     stops = Paths.of(state).stops
     rest = (*stops[:index], *stops[index + 1 :]) or (Stop(),)
-    return SetStops(rest, None, f"Pose {index + 1} removed from the path")
+    return set_stops(rest, None, f"Pose {index + 1} removed from the path")
 
 
-def lift_stop(state: State, index: int) -> SetStops | None:
+def lift_stop(state: State, index: int) -> Act | None:
     """Return the action that moves a pose one place towards the start; None for the first."""
     stops = pinned_stops(state)
     if not 0 < index < len(stops):
         return None
     swapped = (*stops[: index - 1], stops[index], stops[index - 1], *stops[index + 1 :])
-    return SetStops(swapped, index - 1, f"Pose {index + 1} of the path before pose {index}")
+    return set_stops(swapped, index - 1, f"Pose {index + 1} of the path before pose {index}")
 
 
-def set_stop(state: State, text: str, **changes: object) -> SetStop | None:
+def set_stop(state: State, text: str, **changes: object) -> Act | None:
     """Return the action that changes the edited pose or its pause; None if none is edited."""
     chosen = chosen_of(state)
     if chosen is None:
         return None
     stops = [*stops_of(state)]
     stops[chosen] = replace(stops[chosen], **changes)  # pyright: ignore[reportArgumentType]
-    return SetStop(tuple(stops), chosen, f"Pose {chosen + 1} of the path: {text}")
+    text = f"Pose {chosen + 1} of the path: {text}"
+    # All numbers that are set of it are one step.
+    return replace(set_stops(tuple(stops), chosen, text), repeats=True)
 
 
-def stops_in_table(state: State, data: bytes, name: str) -> SetStops:
+def stops_in_table(state: State, data: bytes, name: str) -> Act:
     """Return the action that takes the poses and pauses of a table; it is one of corners.
 
     Positions are those of the tool where the table has columns of it.
@@ -190,4 +175,4 @@ def stops_in_table(state: State, data: bytes, name: str) -> SetStops:
         )
     poses, pauses = read_corners(table, state.design, state.pose.rotation, at)
     stops = tuple(map(Stop, poses, pauses))
-    return SetStops(stops, None, f"Path of {len(stops)} poses from {name}")
+    return set_stops(stops, None, f"Path of {len(stops)} poses from {name}")

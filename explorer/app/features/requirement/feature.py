@@ -10,14 +10,14 @@ from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.requirement import words
 from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import RequiredBox
-from explorer.app.features.requirement.state import FORM, OpenFound, Required
+from explorer.app.features.requirement.state import FORM, Required, open_found
 from explorer.app.features.requirement.work import CHECK_FEED
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import MAIN, Controls
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetPose
+from explorer.app.state.moves import set_pose
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import open_button
@@ -169,10 +169,10 @@ class RequirementPanel:
 
         self._services.session.do(change, who=who)
 
-    def _open(self, index: str) -> OpenFound | None:
+    def _open(self, index: str) -> Action | None:
         designs = () if self._finder.found is None else self._finder.found.designs
         machine = next((each.design for each in designs[int(index) :]), None)
-        return None if machine is None else OpenFound(machine, self._finder.requirement)
+        return None if machine is None else open_found(machine, self._finder.requirement)
 
     def _relax(self, index: str, client: viser.ClientHandle) -> None:
         nearest = () if self._finder.found is None else self._finder.found.nearest
@@ -205,10 +205,10 @@ class Checklist:
             return ""
         return words.checklist(self._feed.drawing, self._feed.problem or "", look_of(self._feed))
 
-    def _go(self, name: str) -> SetPose | None:
+    def _go(self, name: str) -> Action | None:
         demands = () if self._feed.drawing is None else self._feed.drawing.demands
         pose = next((each.pose for each in demands if each.name == name), None)
-        return None if pose is None else SetPose(pose)
+        return None if pose is None else set_pose(pose)
 
 
 def open_requirement(_: Services, data: bytes, name: str) -> tuple[Action, str]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from explorer.app.state.actions import Open
+from explorer.app.state.actions import action, open_design
 from explorer.app.state.parts import FeaturePart, with_value
 from explorer.app.state.state import State
 from explorer.find.requirement import RequiredLegs, RequiredLoad, Requirement
+from explorer.mechanism.design import Design
 
 FORM = "required.form"
 """The path of the requirement of the form."""
@@ -39,12 +40,8 @@ class Required(FeaturePart, name="required"):
         return self.form if self.is_checked else None
 
 
-@dataclass(frozen=True)
-class OpenFound(Open):
+@action("Open {design}", is_jump=True)
+def open_found(state: State, design: Design, requirement: Requirement) -> State:
     """Open a design that was found, with the requirement that it keeps beside it."""
-
-    requirement: Requirement
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        return with_value(super().apply(state), "required", Required(self.requirement, True))
+    opened = open_design(design).apply(state)
+    return with_value(opened, "required", Required(requirement, True))

@@ -16,7 +16,7 @@ from explorer.app.features.paths.work import request_for
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.features.requirement.state import Required
 from explorer.app.features.sharing import scene_files
-from explorer.app.features.sharing.links import OpenLink, decode_link, encode_link
+from explorer.app.features.sharing.links import decode_link, encode_link, open_link
 from explorer.app.features.sharing.reporting import ReportFormat, make_report
 from explorer.app.scene.camera import has_perspective
 from explorer.app.scene.placing import scene_scale
@@ -221,7 +221,7 @@ class ShareButtons:
 
     def _open(self, fragment: str, client: viser.ClientHandle) -> None:
         try:
-            self._services.session.do(OpenLink(decode_link(fragment)), who=client.client_id)
+            self._services.session.do(open_link(decode_link(fragment)), who=client.client_id)
         except InputError as error:
             self._services.complain(sentence(str(error)), client.client_id)
 

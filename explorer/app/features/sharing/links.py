@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
 
 import msgspec
 
 from explorer.app.features.requirement.state import Required
-from explorer.app.state.actions import Action
+from explorer.app.state.actions import action
 from explorer.app.state.parts import parts_kept_on_open, with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View
@@ -70,19 +69,13 @@ def decode_link(fragment: str) -> Link:
     return decode_strictly(decode_fragment(fragment), Link, "the link")
 
 
-@dataclass(frozen=True)
-class OpenLink(Action):
-    """Open the design of a link in its pose, with its view and requirement."""
+@action("Open the link to {design}", is_jump=True)
+def open_link(state: State, link: Link) -> State:
+    """Open the design of a link in its pose, with its view and requirement.
 
-    template: ClassVar[str] = "Open the link to {design}"
-    is_jump: ClassVar[bool] = True
-
-    link: Link
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        state.check_free()
-        link = self.link
-        kept = parts_kept_on_open(state.in_unit_of(link.design)) | {"view": link.view}
-        opened = replace(open_state(link.design, link.pose), **kept)
-        return with_value(opened, Required.in_state, link.required)
+    The action is refused while the design is being optimised.
+    """
+    state.check_free()
+    kept = parts_kept_on_open(state.in_unit_of(link.design)) | {"view": link.view}
+    opened = replace(open_state(link.design, link.pose), **kept)
+    return with_value(opened, Required.in_state, link.required)

@@ -57,7 +57,7 @@ class SingularityPanel:
             "Singularity", lambda state: pose_command("singularity", state.design, state.pose)
         )
         self._table = gui.add_html("")
-        services.do_on_press(GO, lambda value: work.GoToSingularity(int(value)), {"1", "2", "3"})
+        services.do_on_press(GO, lambda value: work.go_to_singularity(int(value)), {"1", "2", "3"})
         for incidence in (1, 2, 3):
             buttons.offer(f"Singularity › Go to δ{incidence} = 0", GO_HINT, GO, str(incidence))
         with gui.add_folder("More", expand_by_default=False):
@@ -234,7 +234,7 @@ class StrataPanel:
             "view.singular.strata",
         )
         self._diagram = gui.add_html("", visible=False)
-        services.do_on_press(PRESS, lambda digits: work.GoToStratum(GOALS[digits]), GOALS)
+        services.do_on_press(PRESS, lambda digits: work.go_to_stratum(GOALS[digits]), GOALS)
         for digits, stratum in GOALS.items():
             label = f"Go to {work.stratum_name(stratum)}: {strata.describe_stratum(stratum)}"
             services.buttons.offer(f"Singularity › {label}", f"{label}.", PRESS, digits)
@@ -380,7 +380,7 @@ SINGULARITY = Feature(
         StateCommand(
             "Singularity › Go to the nearest one",
             "Move the mechanism to the closest of the nearest poses of δ1, δ2 and δ3.",
-            lambda _: work.GoToSingularity(None),
+            lambda _: work.go_to_singularity(None),
             keys=(shift("G"),),
         ),
     ),

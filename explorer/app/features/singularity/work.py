@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from explorer.app.session.feed import Feed, FeedOf
-from explorer.app.state.actions import Action
+from explorer.app.state.actions import action
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import move_to
 from explorer.app.state.state import State
@@ -20,69 +19,55 @@ from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_s
 from explorer.singularity.strata import Stratum, codimension, describe_stratum, stratum_of
 
 
-@dataclass(frozen=True)
-class GoToStratum(Action):
-    """Move to the nearest pose in a stratum of codimension one or more."""
-
-    stratum: Stratum
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: There is no such stratum, or none of its poses is the nearest: it is the
-                generic one, or the pose lies in it or in its boundary.
-        """
-        goal = tuple(self.stratum)
-        nearest = nearest_in_stratum(state.design, state.pose, goal)
-        if codimension(goal) == 0:
-            raise InputError(
-                "generic poses lie arbitrarily close to every pose; choose a singular stratum, or "
-                "move any margin off zero"
-            )
-        here = stratum_of(Configuration.at(state.design, state.pose))
-        if here == goal:
-            raise InputError(
-                f"the pose lies in {stratum_name(goal)} already: {describe_stratum(goal)}"
-            )
-        if nearest.distance == 0.0:
-            raise InputError(
-                f"the pose lies in {stratum_name(here)}, which {stratum_name(goal)} borders on, "
-                "so none of its poses is the nearest; move a margin off zero"
-            )
-        return move_to(state, nearest.pose)
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        return f"Go to stratum {stratum_name(self.stratum)}"
+def _stratum_words(_: State, stratum: Stratum) -> str:
+    return f"Go to stratum {stratum_name(stratum)}"
 
 
-@dataclass(frozen=True)
-class GoToSingularity(Action):
-    """Move to the nearest pose with an incidence, 1 to 3, or with any for None."""
+@action(_stratum_words)
+def go_to_stratum(state: State, stratum: Stratum) -> State:
+    """Move to the nearest pose in a stratum of codimension one or more.
 
-    incidence: int | None
+    Raises:
+        InputError: There is no such stratum, or none of its poses is the nearest: it is the
+            generic one, or the pose lies in it or in its boundary.
+    """
+    goal = tuple(stratum)
+    nearest = nearest_in_stratum(state.design, state.pose, goal)
+    if codimension(goal) == 0:
+        raise InputError(
+            "generic poses lie arbitrarily close to every pose; choose a singular stratum, or "
+            "move any margin off zero"
+        )
+    here = stratum_of(Configuration.at(state.design, state.pose))
+    if here == goal:
+        raise InputError(f"the pose lies in {stratum_name(goal)} already: {describe_stratum(goal)}")
+    if nearest.distance == 0.0:
+        raise InputError(
+            f"the pose lies in {stratum_name(here)}, which {stratum_name(goal)} borders on, "
+            "so none of its poses is the nearest; move a margin off zero"
+        )
+    return move_to(state, nearest.pose)
 
-    def apply(self, state: State) -> State:
-        """Return the next state.
 
-        Raises:
-            InputError: The pose has that incidence already.
-        """
-        poses = nearest_singularities(state.design, state.pose)
-        nearest = min(poses, key=lambda pose: pose.distance)
-        if self.incidence is not None:
-            nearest = poses[self.incidence - 1]
-        if nearest.distance == 0.0:
-            index = nearest.incidence
-            raise InputError(f"the pose has δ{index} = 0 already: {INCIDENCES[index - 1]}")
-        return move_to(state, nearest.pose)
+def _singularity_words(_: State, incidence: int | None) -> str:
+    return f"Go to the nearest {f'pose with δ{incidence} = 0' if incidence else 'singular pose'}"
 
-    def words(self) -> str:
-        """Return the words for the action."""
-        if self.incidence is None:
-            return "Go to the nearest singular pose"
-        return f"Go to the nearest pose with δ{self.incidence} = 0"
+
+@action(_singularity_words)
+def go_to_singularity(state: State, incidence: int | None) -> State:
+    """Move to the nearest pose with an incidence, 1 to 3, or with any for None.
+
+    Raises:
+        InputError: The pose has that incidence already.
+    """
+    poses = nearest_singularities(state.design, state.pose)
+    nearest = min(poses, key=lambda pose: pose.distance)
+    if incidence is not None:
+        nearest = poses[incidence - 1]
+    if nearest.distance == 0.0:
+        index = nearest.incidence
+        raise InputError(f"the pose has δ{index} = 0 already: {INCIDENCES[index - 1]}")
+    return move_to(state, nearest.pose)
 
 
 def stratum_name(stratum: Stratum) -> str:

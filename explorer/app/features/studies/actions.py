@@ -3,77 +3,61 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 from explorer.app.features.studies.state import Brush, Studies, label_of
-from explorer.app.state.actions import Action, Open
+from explorer.app.state.actions import Act, action, open_design
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.errors import InputError
+from explorer.mechanism.design import Design
 from explorer.numerics.number_text import format_apart, format_number
 
 # Ranges of one axis.
 MOST_RANGES = 16
 
 
-@dataclass(frozen=True)
-class OpenStudy(Action):
-    """Open a study by its name; None closes it."""
-
-    name: str | None
-
-    def apply(self, state: State) -> State:
-        """Return the next state, without the brushes and the pick of another study."""
-        if self.name == Studies.of(state).name:
-            return state
-        studies = Studies(name=self.name, plan=Studies.of(state).plan)
-        return with_value(state, "studies", studies)
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        return "Close the study" if self.name is None else f"Study {self.name}"
+def _study_words(_: State, name: str | None) -> str:
+    return "Close the study" if name is None else f"Study {name}"
 
 
-@dataclass(frozen=True)
-class BrushAxes(Action):
-    """Select designs within ranges of some axes; an axis without ranges is freed."""
-
-    brushes: tuple[Brush, ...]
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse too many ranges, and ranges without numbers."""
-        studies = Studies.of(state)
-        for brush in self.brushes:
-            _check_ranges(brush)
-            studies = studies.with_ranges(brush.axis, brush.ranges)
-        return with_value(state, "studies", studies)
-
-    def words(self) -> str:
-        """Return the words for the action."""
-        verb = "Filter" if any(brush.ranges for brush in self.brushes) else "Free"
-        return f"{verb} {' and '.join(label_of(brush.axis) for brush in self.brushes)}"
+@action(_study_words)
+def open_study(state: State, name: str | None) -> State:
+    """Open a study by its name, without the brushes and the pick of another one; None closes it."""
+    if name == Studies.of(state).name:
+        return state
+    return with_value(state, "studies", Studies(name=name, plan=Studies.of(state).plan))
 
 
-def free_axes(state: State) -> BrushAxes:
+def _brush_words(_: State, brushes: tuple[Brush, ...]) -> str:
+    verb = "Filter" if any(brush.ranges for brush in brushes) else "Free"
+    return f"{verb} {' and '.join(label_of(brush.axis) for brush in brushes)}"
+
+
+@action(_brush_words)
+def brush_axes(state: State, brushes: tuple[Brush, ...]) -> State:
+    """Select designs within ranges of some axes; an axis without ranges is freed.
+
+    Raises:
+        InputError: Too many ranges of an axis, or a range without numbers.
+    """
+    studies = Studies.of(state)
+    for brush in brushes:
+        _check_ranges(brush)
+        studies = studies.with_ranges(brush.axis, brush.ranges)
+    return with_value(state, "studies", studies)
+
+
+def free_axes(state: State) -> Act:
     """Return the action that frees all axes."""
-    return BrushAxes(tuple(Brush(brush.axis, ()) for brush in Studies.of(state).brushes))
+    return brush_axes(tuple(Brush(brush.axis, ()) for brush in Studies.of(state).brushes))
 
 
-@dataclass(frozen=True)
-class PickDesign(Open):
+@action("Pick {design}", is_jump=True)
+def pick_design(state: State, design: Design, index: int, study: str) -> State:
     """Open the design with an index in a study, which must be the open one."""
-
-    template: ClassVar[str] = "Pick {design}"
-
-    index: int = 0
-    study: str = ""
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse a design of another study than the open one."""
-        if Studies.of(state).name != self.study:
-            raise InputError(f"the study {self.study!r} is not open any more")
-        return with_value(super().apply(state), "studies.picked", self.index)
+    if Studies.of(state).name != study:
+        raise InputError(f"the study {study!r} is not open any more")
+    return with_value(open_design(design).apply(state), "studies.picked", index)
 
 
 def _check_ranges(brush: Brush) -> None:

@@ -14,7 +14,12 @@ import msgspec
 import viser
 
 from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
-from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
+from explorer.app.features.studies.actions import (
+    brush_axes,
+    free_axes,
+    open_study,
+    pick_design,
+)
 from explorer.app.features.studies.figures import PlotName, brushes_in, reading_of, row_at
 from explorer.app.features.studies.folders import keep_study, study_folders
 from explorer.app.features.studies.state import (
@@ -108,7 +113,7 @@ class StudiesPanel:
             self.choice,
             ControlBinding(
                 lambda frame: Studies.of(frame.state).name or NO_OPTION,
-                lambda _, name: OpenStudy(None if name == NO_OPTION else name),
+                lambda _, name: open_study(None if name == NO_OPTION else name),
             ),
         )
         self._acts = gui.add_html("")
@@ -183,7 +188,7 @@ class StudiesPanel:
             self._complain(str(error), who)
             return
         name = str(drawing.studies.name)
-        self._session.do(PickDesign(design, index=index, study=name), who=who)
+        self._session.do(pick_design(design, index, name), who=who)
 
     def _receive(self, line: str, client: viser.ClientHandle) -> None:
         event, drawing = decode_text(line, DECODER), self.feed.drawing
@@ -195,10 +200,10 @@ class StudiesPanel:
             return
         if event.act == "free":
             free = (Brush(name, ()) for name in plotted.axes_of(event.plot))
-            self._session.do(BrushAxes(tuple(free)), who=who)
+            self._session.do(brush_axes(tuple(free)), who=who)
         elif event.act == "brush":
             brushes = brushes_in(plotted, event.plot, event.start, event.end)
-            self._session.do(BrushAxes(tuple(brushes)), who=who)
+            self._session.do(brush_axes(tuple(brushes)), who=who)
         else:
             row = row_at(plotted, event.plot, event.end, event.size)
             if event.act == "read":
@@ -244,7 +249,7 @@ class StudiesPanel:
             "cancel": (lambda _, __: self.runner.cancel(), lambda: self.runner.run is not None),
             "continue": (self._go_on, self._can_go_on),
             "new": (
-                lambda _, client: self._session.do(OpenStudy(None), who=client.client_id),
+                lambda _, client: self._session.do(open_study(None), who=client.client_id),
                 lambda: Studies.of(self._session.state).name is not None,
             ),
             "clear": (
@@ -310,14 +315,14 @@ class StudyChip:
         return activity("Studies", run.name, f"{format_number(done)} designs", run.share, cancel)
 
 
-def open_study(services: Services, data: bytes, name: str) -> tuple[Action, str]:
+def open_study_file(services: Services, data: bytes, name: str) -> tuple[Action, str]:
     """Return the action that opens the study in a file, and what it is; see `Opener`."""
     check_extra("study")
     study, folders = decode_study(data, name), services.get(study_folders)
     folder = folders.new(study.name)
     keep_study(folder, study)
     services.get(study_feed).look()
-    return OpenStudy(folder.name), f"The study {study.name}; {BUTTONS['continue'][0]} computes it."
+    return open_study(folder.name), f"The study {study.name}; {BUTTONS['continue'][0]} computes it."
 
 
 def send_table(services: Services, name: str, who: Who) -> None:
@@ -349,6 +354,6 @@ STUDIES = Feature(
             lambda services: Studies.of(services.session.state).name is not None,
         ),
     ),
-    openers=dict.fromkeys(("variables", "sampling", "measures", "objectives"), open_study),
+    openers=dict.fromkeys(("variables", "sampling", "measures", "objectives"), open_study_file),
     is_offered=lambda services: services.has(study_folders),
 )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from explorer.app.features.studies.actions import OpenStudy
+from explorer.app.features.studies.actions import open_study
 from explorer.app.features.studies.feed import StudyFeed
 from explorer.app.features.studies.folders import keep_study, study_folders, study_in
 from explorer.app.features.studies.state import Studies, StudyPlan, study_around
@@ -157,7 +157,7 @@ class StudyRunner:
                 died=DIED,
             )
         self.feed.look()
-        self._session.do(OpenStudy(name), who=who)
+        self._session.do(open_study(name), who=who)
 
     def _receive(self, progress: Progress) -> None:
         with self._lock:
@@ -181,7 +181,7 @@ class StudyRunner:
             # It was refused: nothing remains of it.
             self.feed.folders.drop(run.name)
             self.feed.look()
-            self._session.do(lambda s: OpenStudy(None) if Studies.of(s).name == run.name else None)
+            self._session.do(lambda s: open_study(None) if Studies.of(s).name == run.name else None)
 
     def _finish(self) -> None:
         with self._lock:

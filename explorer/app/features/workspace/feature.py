@@ -21,7 +21,7 @@ from explorer.app.scene.surfaces import Measure
 from explorer.app.session.session import Change
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import SetPose, StartThere
+from explorer.app.state.moves import set_pose, start_there
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.buttons import figure
@@ -212,7 +212,7 @@ class WorkspacePanel:
         trouble = None if self._drawing is None else self._drawing.trouble
         if self._drawing is None or trouble is None or trouble.nearest is None:
             return None
-        return StartThere(Pose.of(trouble.nearest, self._drawing.request.rotation))
+        return start_there(Pose.of(trouble.nearest, self._drawing.request.rotation))
 
     def _read(self, text: str, client: viser.ClientHandle) -> None:
         """Answer a browser that asks for the words at a position on the map."""
@@ -228,7 +228,7 @@ def _go_to(text: str) -> Change | None:
     position: Triple | None = decode_text(text, _POSITION)
     if position is None:
         return None
-    return lambda state: SetPose(state.pose_at(position, feeds.workspace_pose(Frame(state))))
+    return lambda state: set_pose(state.pose_at(position, feeds.workspace_pose(Frame(state))))
 
 
 def _part_chips(services: Services) -> Chips:
