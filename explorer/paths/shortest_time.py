@@ -29,6 +29,8 @@ from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_apart
 from explorer.paths.time_law import PLATFORM, LedIntervals, TimeLaw, Travel
 
+# Modules that find the law, which take seconds to load.
+TIMING = "toppra.algorithm", "toppra.constraint"
 # Fewest intervals of a move, and steps of an interval after which limits are checked.
 FEWEST_INTERVALS, STEPS = 64, 10
 SINGULAR = "the path is singular, so that no forces move the platform along it"
@@ -142,7 +144,7 @@ def _law_of_move(
 
 def _fastest_rates(share: FloatArray, bounds: RateBounds) -> FloatArray:
     """Return the greatest rates at shares of a move, shape (n,), which start and end at zero."""
-    algorithm, constraint = load_extra("timing", "toppra.algorithm", "toppra.constraint")
+    algorithm, constraint = load_extra("timing", *TIMING)
     is_bounded = np.isfinite(bounds.most).all(axis=0)
     a, b, most = (each[:, is_bounded] for each in (bounds.a, bounds.b, bounds.most))
     # The tolerances of toppra are absolute, so it gets squared rates of about one.

@@ -23,6 +23,8 @@ from explorer.app.features.calibration.feature import (
 )
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Services
+from explorer.app.features.paths.feature import PATHS
+from explorer.app.features.paths.state import Paths
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import open_design
 from explorer.app.state.frame import Frame
@@ -66,7 +68,7 @@ def page(
         jobs=jobs,
         complain=desk.complain,
         user_data=UserData(Library(tmp_path / "designs"), SessionFile()),
-        declared=(CALIBRATION,),
+        declared=(CALIBRATION, PATHS),
     )
 
 
@@ -92,8 +94,12 @@ def test_table_that_is_dropped_is_measured_or_has_the_targets(page: Services, de
     drop(page, table, "m.txt")
     first, second, third = desk.complaints
     assert "line of headings" in first
-    assert "path.csv has neither joints" in second
+    assert "path.csv has a column time" in second
     assert "m.txt is no design, study or session" in third
+    assert Calibrated.of(desk.state) == Calibrated()
+    drop(page, "x,y,z,pause_s\n11,5,9,1\n12,5,9,0\n", "poses.csv")
+    stops = Paths.of(desk.state).stops
+    assert [stop.pause for stop in stops] == [1.0, 0.0]
     assert Calibrated.of(desk.state) == Calibrated()
     page.stop()
 

@@ -99,6 +99,12 @@ def test_search_of_nothing_and_of_no_words_finds_nothing(entries: list[Entry]) -
     assert find("", entries) == find("  ", entries) == find("xqzwv", entries) == []
 
 
+def test_text_in_folders_tells_them_from_the_outer_one_to_the_inner(entries: list[Entry]) -> None:
+    folders = {each.label: each.folders for each in entries if each.kind == "text"}
+    assert folders["Warn below (mm)"] == ("More",)
+    assert folders["yaw of home"] == ("Problem", "Free variables")
+
+
 def test_lines_of_markup_have_the_hint_and_the_tab_of_what_they_stand_in() -> None:
     markup = '<div title="why">a <b>b</b><br>c<p data-opens="Tab">d</div><span>e</p></span>&lt;f'
     assert [tuple(each) for each in lines_of(markup)] == [

@@ -28,6 +28,8 @@ from explorer.app.widgets.markup import dim
 from explorer.app.widgets.theme import Theme
 from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
 from explorer.jobs.jobs import Jobs
+from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
+from explorer.page.look import call_script, read_script
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Command, Commands
 
@@ -133,6 +135,31 @@ class Services:
         """Add a button that does a command, and offer it; return the button as HTML."""
         Chips(self.buttons, self.session, name, "", {"": command})
         return command.html(name, "", "ex-link")
+
+    def add_upload(
+        self,
+        label: str,
+        hint: str,
+        kinds: str,
+        take: Callable[[bytes, str, viser.ClientHandle | None], None],
+        *,
+        takes_drops: bool = False,
+    ) -> None:
+        """Add a button that chooses files of some MIME types; `take` gets content and name of each.
+
+        One button of the page also takes the files that are dropped on it.
+        """
+        button = self.gui.add_upload_button(
+            label, color="gray", icon=viser.Icon.UPLOAD, mime_type=kinds, hint=hint
+        )
+        run_script(self.server, read_script("files", element_id(button), takes_drops))
+
+        @button.on_upload
+        def _(event: viser.GuiEvent[viser.GuiUploadButtonHandle]) -> None:
+            take(button.value.content, button.value.name, event.client)
+            # The button holds one file; the next one of several comes now.
+            if event.client is not None:
+                run_script_in(event.client, call_script("sendFile"))
 
     def copy_button(self, answer: str, command_of: Callable[[State], str]) -> str:
         """Add the button that copies the command of an answer in a state; return it as HTML."""
@@ -280,8 +307,8 @@ class Feature:
         name: Name of its folder.
         manual: What the button "?" of its tabs opens in the manual, the file of a page with "#" and
             a heading of it; "" for no button. Tabs that features share have that of the first.
-        openers: Functions that open files, by a field that no other kind of file has, or by the
-            suffix of files that are no JSON; a file with none of these fields is a design.
+        openers: Functions that open files, by a field that no other kind of file has, or of tables
+            by a column, by all columns, or by the suffix; any other file is a design.
         verdicts: The verdicts that its first tab gives, each with a sentence on what it means.
         feeds: Feeds, which request drawings from the process of the page; `FeedOf` declares one.
         later_feeds: Feeds whose requests come after those of all features' `feeds`, since nobody

@@ -52,8 +52,10 @@ window.explorer.opens ??= (() => {
     }
   };
   addEventListener("click", ({ target }) => {
-    const title = target.closest?.("[data-opens]")?.dataset.opens;
-    if (title) open(title);
+    const { opens, value } = target.closest?.("[data-opens]")?.dataset ?? {};
+    if (opens) open(opens);
+    // A text that was found names the folders that it stands in.
+    if (opens && value) window.explorer.unfold(value.split("\n"));
   });
   // What a dialog was opened for is done: it leaves the view of the result.
   addEventListener("click", ({ target }) => {

@@ -53,6 +53,15 @@ window.explorer.stops ??= (() => {
     folders[nameOf(head)] = !isOpen(head);
     storage?.setItem(KEY, JSON.stringify(folders));
   });
+  // Opens the folders in sight with these heads, the outer one first.
+  window.explorer.unfold = ([name, ...inner]) =>
+    window.explorer.clock.after(100, () => {
+      const isMeant = (head) =>
+        head.textContent === name && !isOpen(head) && head.checkVisibility();
+      // Those of a dialog come last.
+      [...document.querySelectorAll(HEAD)].findLast(isMeant)?.click();
+      if (inner.length) window.explorer.unfold(inner);
+    });
   // The nearest button in the direction of an arrow; one aside counts as farther.
   const neighbour = (items, from, [right, down]) => {
     const middleOf = (it) => {

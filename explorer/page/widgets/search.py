@@ -40,6 +40,7 @@ class Entry:
         value: Label of a command, title of the tab of a text, "" for one that is always in sight,
             or place in the manual.
         is_ready: Function that tells whether it can be pressed now.
+        folders: Titles of the folders that a text stands in, the outer one first.
     """
 
     kind: Kind
@@ -47,6 +48,7 @@ class Entry:
     does: str
     value: str
     is_ready: Callable[[], bool] = lambda: True
+    folders: tuple[str, ...] = ()
 
 
 @lru_cache(maxsize=8192)
@@ -108,7 +110,8 @@ def page_texts(gui: viser.GuiApi) -> Iterator[Entry]:
         for line in lines:
             tab = titles[0] if titles else line.opens
             if line.words:
-                found.setdefault((tab, line.words), Entry("text", line.words, line.hint, tab))
+                entry = Entry("text", line.words, line.hint, tab, folders=titles[1:])
+                found.setdefault((tab, line.words), entry)
     yield from found.values()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from explorer.app.features.feature import Feature, Services, Tab, html_of
 from explorer.app.inputs.controls import Controls
@@ -124,15 +124,8 @@ class CalibrationPanel:
             self._services.downloads.send(who, "machine.json", data)
 
 
-def open_table(_: Services, data: bytes, name: str) -> tuple[Action, str]:
-    """Return the action that takes a table: one without joints has the places of targets."""
-    columns = {*parse_table(name, data, 1.0).columns}
-    if "l1" not in columns and columns != {*"xyz"}:
-        raise InputError(
-            f"{name} has neither joints (l1 to l4) and what was measured of a machine, nor the "
-            "places of targets alone (x, y, z)"
-        )
-    field = "measured" if "l1" in columns else "targets"
+def open_table(field: str, _: Services, data: bytes, name: str) -> tuple[Action, str]:
+    """Return the action that takes a table, "measured" or "targets"."""
     action = Set(f"calibrated.{field}", decode_text(data, "cp1252"), NAMES[field], name)
     return action, f"{NAMES[field]}; the tab Loads has the machine."
 
@@ -141,6 +134,6 @@ CALIBRATION = Feature(
     "calibration",
     manual="calibration.md",
     tabs=(Tab("analyse", "Loads", CalibrationPanel),),
-    openers={".csv": open_table},
+    openers={"l1": partial(open_table, "measured"), "x,y,z": partial(open_table, "targets")},
     later_feeds=(CALIBRATION_FEED,),
 )

@@ -27,11 +27,10 @@ from explorer.app.storage.library import LibraryFile, copy_name
 from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.markup import box, note
 from explorer.errors import ExplorerError, InputError
+from explorer.export.pose_tables import parse_table
 from explorer.files.json_text import field_names
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
-from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
-from explorer.page.look import call_script, read_script
 from explorer.page.session.latest import LatestWins
 from explorer.page.widgets.assigning import Update
 from explorer.page.widgets.palette import Command, Key, Run
@@ -136,11 +135,14 @@ class SavedDesigns:
 
         def work() -> None:
             openers = {k: v for one in self._services.features for k, v in one.openers.items()}
-            is_json = data.lstrip(BEFORE_JSON).startswith(b"{")
-            suffixes = openers.keys() & {Path(name).suffix.lower()}
-            if not (is_json or suffixes):
+            suffix = Path(name).suffix.lower()
+            if data.lstrip(BEFORE_JSON).startswith(b"{"):
+                fields = field_names(data)
+            elif suffix == ".csv":
+                columns = parse_table(name, data, 1.0).columns
+                fields = {*columns, ",".join(sorted(columns)), suffix}
+            else:
                 raise InputError(f"{name} is no design, study or session; these are JSON files")
-            fields = field_names(data) if is_json else suffixes
             opener = next((openers[each] for each in openers if each in fields), open_design_file)
             action, words = opener(self._services, data, name)
             before = self._session.latest_state()
@@ -265,23 +267,14 @@ class DesignsPanel:
             keys = KEYS.get(option, ())
             services.commands.offer(self._buttons, _run(act), option=option, keys=keys)
         self.status = gui.add_html("")
-        upload = gui.add_upload_button(
+        services.add_upload(
             "Open a file …",
-            color="gray",
-            icon=viser.Icon.UPLOAD,
-            mime_type="application/json,text/csv",
-            hint="A design, a study or a session (JSON), or what was measured of a machine (CSV), "
-            "from this computer; or drop it anywhere on the page.",
+            "A design, a study or a session (JSON), what was measured of a machine or the poses of "
+            "a path (CSV), from this computer; or drop it anywhere on the page.",
+            "application/json,text/csv",
+            saved.take,
+            takes_drops=True,
         )
-        run_script(services.server, read_script("files", element_id(upload), True))
-
-        @upload.on_upload
-        def _(event: viser.GuiEvent[viser.GuiUploadButtonHandle]) -> None:
-            saved.take(upload.value.content, upload.value.name, event.client)
-            # The button holds one file; the next one of several comes now.
-            if event.client is not None:
-                run_script_in(event.client, call_script("sendFile"))
-
         self.list = gui.add_html("")
         self.restore = gui.add_button(
             "Bring back",

@@ -88,7 +88,7 @@ def _result(entry: Entry) -> str:
     return press_button(
         # A tab that is opened closes the search, too.
         "" if tab else PRESSES[entry.kind],
-        entry.value,
+        "\n".join(entry.folders) if tab else entry.value,
         f"<span>{escape(entry.label)}</span>{where}{does}",
         class_name="ex-row",
         opens=tab,

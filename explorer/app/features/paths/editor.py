@@ -28,8 +28,6 @@ from explorer.numerics.number_text import (
     format_number,
     snap_to_decimals,
 )
-from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
-from explorer.page.look import call_script, read_script
 from explorer.page.widgets.assigning import Updates
 
 PRESENT, TYPED = "Present pose", "Typed numbers"
@@ -121,23 +119,18 @@ class StopsEditor:
                 ),
             ),
         ]
-        upload = gui.add_upload_button(
+
+        def take(data: bytes, name: str, client: viser.ClientHandle | None) -> None:
+            who = None if client is None else client.client_id
+            session.do(lambda state: stops.stops_in_table(state, data, name), who=who)
+
+        services.add_upload(
             "Poses from a file …",
-            color="gray",
-            icon=viser.Icon.UPLOAD,
-            mime_type="text/csv",
-            hint="A table of poses such as explorer inverse --poses reads (CSV); a column pause_s "
-            "has the pauses.",
+            "A table of poses such as explorer inverse --poses reads (CSV); a column pause_s has "
+            "the pauses.",
+            "text/csv",
+            take,
         )
-
-        run_script(services.server, read_script("files", element_id(upload), False))
-
-        @upload.on_upload
-        def _(event: viser.GuiEvent[viser.GuiUploadButtonHandle]) -> None:
-            data, name = upload.value.content, upload.value.name
-            session.do(lambda state: stops.stops_in_table(state, data, name), who=event.client_id)
-            if event.client is not None:
-                run_script_in(event.client, call_script("sendFile"))
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the list show the frame."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from threading import Thread
 
 import numpy as np
 import viser
@@ -11,7 +12,7 @@ from explorer.app.features.feature import Feature, InBar, Runner, Services, Tab,
 from explorer.app.features.paths.actions import advance_journey, plan, play, take_plan
 from explorer.app.features.paths.panel import PathsPanel, slow_words
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
-from explorer.app.features.paths.stops import stops_of
+from explorer.app.features.paths.stops import stops_in_table, stops_of
 from explorer.app.features.paths.work import DRIVES_FEED
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
@@ -20,6 +21,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import activity, press_button
 from explorer.app.widgets.chips import StateCommand
+from explorer.files.extras import is_missing, load_extra
 from explorer.jobs.jobs import LongJob
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
@@ -27,6 +29,7 @@ from explorer.numerics.number_text import format_decimals, format_number
 from explorer.page.session.clock import Ticker
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key
+from explorer.paths.shortest_time import TIMING
 from explorer.singularity.colours import FAR, SINGULAR
 
 # Number of crossings that are drawn at most.
@@ -98,6 +101,11 @@ class PathRunner(Runner):
         self._request = 0
         self._job: LongJob | None = None
 
+    def prepare(self) -> None:
+        """Load what finds the shortest times, which takes seconds, before anybody asks for one."""
+        if not is_missing("timing"):
+            Thread(target=load_extra, args=("timing", *TIMING), daemon=True).start()
+
     def follow(self, frame: Frame) -> None:
         """Start or stop playing and planning as a frame requests."""
         paths = Paths.of(frame.state)
@@ -157,6 +165,12 @@ class PathRunner(Runner):
         return advance_journey(passed)
 
 
+def open_poses(services: Services, data: bytes, name: str) -> tuple[Action, str]:
+    """Return the action that takes a table of poses for the next path; see `Opener`."""
+    action = stops_in_table(services.session.latest_state(), data, name)
+    return action, "Poses of a path; the tab Paths has them."
+
+
 PATHS = Feature(
     "paths",
     manual="singularity.md#Paths",
@@ -170,6 +184,7 @@ PATHS = Feature(
     scene=(PathScene,),
     later_feeds=(DRIVES_FEED,),
     runners=(PathRunner,),
+    openers={".csv": open_poses},
     commands=(
         StateCommand(
             "Paths › Play or pause",
