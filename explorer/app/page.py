@@ -44,6 +44,7 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import sentence
 from explorer.app.widgets.theme import Theme
+from explorer.export.drawings.markup import drawing_style
 from explorer.jobs.jobs import PAGE, Jobs, log_error
 from explorer.measures.field_words import message_of
 from explorer.numerics.arrays import FloatArray
@@ -151,7 +152,7 @@ class Page:
         gui.set_panel_label(TITLE)
         self.buttons = Buttons(server)
         theme = Theme(server, self.buttons, self.session.redraw)
-        run_script(server, read_stylesheet())
+        run_script(server, read_stylesheet(f".ex-machine {{{drawing_style()}}}"))
         for script in SCRIPTS:
             run_script(server, read_script(script))
         self.panels = Panels(gui)

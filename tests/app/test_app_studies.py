@@ -359,7 +359,7 @@ def draw_study(feed: StudyFeed, studies: Studies, jobs: Jobs | None = None) -> S
 
 def designs_in(html: str) -> list[str]:
     """Return the paths of the designs of a plot, one for each, in any order."""
-    drawn = re.findall('<path(?: class="front")? style="[^"]*" d="([^"]*)">', html)
+    drawn = re.findall('<path(?: class="front")? style="[^"]*" d="([^"]*)"', html)
     return sorted(f"M{each}" for path in drawn for each in path.split("M")[1:])
 
 

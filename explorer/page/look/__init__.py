@@ -29,9 +29,9 @@ def call_script(name: str, *arguments: object) -> str:
     return f"window.explorer.{name}({values});\n"
 
 
-def read_stylesheet() -> str:
-    """Return the script that puts the stylesheet into a page, in place of an older one."""
-    return read_script("style", read_file("page.css"))
+def read_stylesheet(before: str = "") -> str:
+    """Return the script that puts the stylesheet into a page, after other rules, if any."""
+    return read_script("style", before + read_file("page.css"))
 
 
 def read_file(file: str) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from typing import Literal
 from xml.etree.ElementTree import Element
@@ -55,6 +56,11 @@ SIDE, RIM = 10_000, 0.04
 NEAR = 8.0
 # Width of a brush on an axis of the lines, as a share of the distance of the axes.
 BRUSH = 0.24
+# Widths of lines, and of points, which are lines without a length, in pixels.
+WIDTHS: dict[PlotName, dict[str, float]] = {
+    "lines": {"": 0.8, "grid": 0.8, "front": 1, "picked": 3, "near": 3, "core": 0},
+    "points": {"": 5, "grid": 1, "step": 1, "front": 8, "picked": 15, "near": 9, "core": 9},
+}
 HINTS: dict[PlotName, str] = {
     "lines": "Drag along an axis to filter, double-click to free the axes; click a design to open "
     "it.",
@@ -332,13 +338,14 @@ def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[El
     is_coloured, others = np.isfinite(shares), inside & ~front
     level = (np.nan_to_num(shares) * len(SCALE)).astype(np.int64)
     best = inside & front
+    path = partial(_path, WIDTHS[plot])
     pieces = [
-        _path("grid", grid),
+        path("grid", grid),
         *boxes,
-        _path("", places[~inside], LEFT_OUT),
-        _path("", places[others & ~is_coloured], PLAIN),
+        path("", places[~inside], LEFT_OUT),
+        path("", places[others & ~is_coloured], PLAIN),
         *(
-            _path("", places[others & is_coloured & (level == k)], colour)
+            path("", places[others & is_coloured & (level == k)], colour)
             for k, colour in enumerate(SCALE)
         ),
     ]
@@ -346,17 +353,17 @@ def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[El
     if plot == "points" and objectives == sorted((plotted.across, plotted.up)):
         # The front from left to right, in a line.
         order = np.argsort(places[best][:, 0, 0], kind="stable")
-        pieces.append(_path("step", places[best][order].reshape(1, -1, 2), FRONT))
+        pieces.append(path("step", places[best][order].reshape(1, -1, 2), FRONT))
     pieces += [
-        _path("front", places[best], FRONT),
-        _path("picked", places[picked], PICKED),
-        _path("core", places[picked]),
+        path("front", places[best], FRONT),
+        path("picked", places[picked], PICKED),
+        path("core", places[picked]),
     ]
     return page_picture(
         None,
         f"Plot of {len(rows)} designs as {plot}",
         *pieces,
-        element("path", class_="near"),
+        element("path", class_="near", stroke_width=WIDTHS[plot]["near"]),
         element("rect", class_="drag"),
         viewBox=f"0 0 {SIDE} {SIDE}",
         preserveAspectRatio="none",
@@ -364,11 +371,13 @@ def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[El
     )
 
 
-def _path(look: str, places: FloatArray, colour: str = "") -> Element | None:
+def _path(
+    widths: dict[str, float], look: str, places: FloatArray, colour: str = ""
+) -> Element | None:
     if not places.size:
         return None
-    style = f"stroke:{colour}" if colour else None
-    return element("path", class_=look or None, style=style, d=path_of(places))
+    style, data = f"stroke:{colour}" if colour else None, path_of(places)
+    return element("path", class_=look or None, style=style, d=data, stroke_width=widths[look])
 
 
 def _ranges(plotted: PlotRows, name: str) -> list[state.Range]:
