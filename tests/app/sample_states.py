@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from explorer.app.features.calibration.feature import Calibrated
 from explorer.app.features.compare.feature import pin, unpin
-from explorer.app.features.compare.state import CompareView
+from explorer.app.features.compare.work import CompareView
 from explorer.app.features.optimise.actions import (
     accept,
     add_iterates,
@@ -31,8 +31,7 @@ from explorer.app.features.paths.actions import go, play, set_path_time
 from explorer.app.features.paths.state import Stop
 from explorer.app.features.paths.stops import add_present
 from explorer.app.features.requirement.state import EXAMPLE, Required
-from explorer.app.features.studies.actions import brush_axes
-from explorer.app.features.studies.state import Brush, Studies
+from explorer.app.features.studies.state import Brush, Studies, brush_axes
 from explorer.app.session.history import UserAction
 from explorer.app.state.actions import Action, Set, open_design
 from explorer.app.state.folds import set_fold

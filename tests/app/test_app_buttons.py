@@ -28,7 +28,7 @@ from sample_states import iterates_of
 from server_clock import settle
 from socket_tab import SocketTab
 
-from explorer.app.features.compare.state import SLOTS, Compared
+from explorer.app.features.compare.work import SLOTS, Compared
 from explorer.app.features.optimise import runner
 from explorer.app.features.optimise.actions import start_run
 from explorer.app.features.optimise.state import Optimisation, OptimisationRequest, SearchResult

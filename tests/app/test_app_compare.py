@@ -18,7 +18,6 @@ from services import StubJobs, services_for
 
 from explorer.app.features.compare.feature import ComparePanel, pin, unpin
 from explorer.app.features.compare.scene import APART, SCENES
-from explorer.app.features.compare.state import Compared, CompareView
 from explorer.app.features.compare.table import (
     ComparedDesign,
     best_of,
@@ -30,8 +29,10 @@ from explorer.app.features.compare.table import (
 from explorer.app.features.compare.work import (
     FEEDS,
     LIVE,
+    Compared,
     ComparedRequest,
     CompareFeed,
+    CompareView,
     draw_compared,
     drawing_in,
 )

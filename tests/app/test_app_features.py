@@ -35,8 +35,8 @@ from explorer.app.features.paths.actions import SetLaw, advance_journey, set_pat
 from explorer.app.features.paths.stops import choose_stop
 from explorer.app.features.requirement.state import open_found
 from explorer.app.features.sharing.links import open_link
-from explorer.app.features.studies.actions import pick_design
 from explorer.app.features.studies.folders import StudyFolders
+from explorer.app.features.studies.state import pick_design
 from explorer.app.features.view.feature import CAMERA_HINTS
 from explorer.app.features.workspace.words import CLAIM
 from explorer.app.inputs.bindings import At, ControlBinding

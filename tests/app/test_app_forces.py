@@ -19,12 +19,13 @@ from services import StubJobs, services_for
 
 from explorer import Actuators, Guide, Payload, Struts, Tolerances, Tool
 from explorer.app.features.feature import Services
-from explorer.app.features.loads.budget import budget_of, budget_table
 from explorer.app.features.loads.feature import ForcesPanel, load_figure
 from explorer.app.features.loads.load import (
     FITTING,
     WEIGHTS_FEED,
     Loads,
+    budget_of,
+    budget_table,
     fitting_scale,
     nearest_feed,
     set_force,

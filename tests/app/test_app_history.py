@@ -24,7 +24,7 @@ from explorer.app.features.paths.actions import advance_journey, go, play, set_p
 from explorer.app.features.paths.panel import CANCEL
 from explorer.app.features.paths.state import journey_of
 from explorer.app.features.singularity.work import go_to_singularity
-from explorer.app.features.studies.actions import open_study
+from explorer.app.features.studies.state import open_study
 from explorer.app.server import Running
 from explorer.app.session import history
 from explorer.app.session.history import (

@@ -26,10 +26,13 @@ from explorer.app.features.feature import Services
 from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.paths.actions import (
+    DrivesRequest,
     SetLaw,
     advance_journey,
+    draw_drives,
     go,
     play,
+    request_for,
     set_path_time,
     take_plan,
 )
@@ -70,7 +73,6 @@ from explorer.app.features.paths.stops import (
     stops_in_table,
     stops_of,
 )
-from explorer.app.features.paths.work import DrivesRequest, draw_drives, request_for
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame

@@ -26,8 +26,7 @@ from explorer.app.features.requirement.feature import (
 )
 from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import EDGES, box_corners
-from explorer.app.features.requirement.state import EXAMPLE, Required
-from explorer.app.features.requirement.work import CHECK_FEED
+from explorer.app.features.requirement.state import CHECK_FEED, EXAMPLE, Required
 from explorer.app.server import FIRST_DESIGN
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, open_design

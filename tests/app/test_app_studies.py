@@ -21,7 +21,6 @@ from services import StubJobs
 
 from explorer.app.features.feature import Services
 from explorer.app.features.studies import work
-from explorer.app.features.studies.actions import brush_axes, free_axes, open_study, pick_design
 from explorer.app.features.studies.feature import DECODER, PlotEvent, StudiesPanel
 from explorer.app.features.studies.feed import StudyDrawing, StudyFeed
 from explorer.app.features.studies.figures import (
@@ -51,7 +50,11 @@ from explorer.app.features.studies.state import (
     Brush,
     Studies,
     StudyPlan,
+    brush_axes,
     choices_for,
+    free_axes,
+    open_study,
+    pick_design,
     range_around,
     study_around,
     within,

@@ -23,8 +23,7 @@ from workspace_feeds import draw
 
 from explorer.app.features.compare.feature import pin
 from explorer.app.features.compare.scene import SCENES
-from explorer.app.features.compare.state import CompareView
-from explorer.app.features.compare.work import FEEDS
+from explorer.app.features.compare.work import FEEDS, CompareView
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.feature import MovePanel
 from explorer.app.features.mechanism.marks import DragHandle

@@ -6,7 +6,7 @@ from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.app.features.compare.feature import pin
-from explorer.app.features.compare.state import Compared
+from explorer.app.features.compare.work import Compared
 from explorer.mechanism.design_file import PRESETS
 
 

@@ -10,10 +10,9 @@ import pytest
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.features.studies.actions import open_study
 from explorer.app.features.studies.feature import StudiesPanel
 from explorer.app.features.studies.figures import LEFT_OUT, PlotName, PlotRows, reading_of
-from explorer.app.features.studies.state import Studies, StudyPlan, within
+from explorer.app.features.studies.state import Studies, StudyPlan, open_study, within
 from explorer.app.session.session import UNDO
 from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import write_part

@@ -10,7 +10,7 @@ from unittest import mock
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.optimise.runner import SEARCH
 from explorer.app.features.optimise.state import Optimisation
-from explorer.app.features.requirement.work import CHECK_FEED
+from explorer.app.features.requirement.state import CHECK_FEED
 from explorer.app.page import Page
 from explorer.jobs.jobs import PAGE
 from explorer.page.session import clock

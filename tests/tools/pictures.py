@@ -26,14 +26,13 @@ from playwright.sync_api import Browser, FloatRect, Page
 from server_clock import wait_until_drawn
 
 from explorer.app.features.compare.feature import pin
-from explorer.app.features.compare.state import CompareView
+from explorer.app.features.compare.work import CompareView
 from explorer.app.features.optimise.actions import start_run
 from explorer.app.features.optimise.state import OptimisationRequest
 from explorer.app.features.requirement.state import EXAMPLE, open_found
 from explorer.app.features.sharing.reporting import make_report
-from explorer.app.features.studies.actions import brush_axes, open_study, pick_design
 from explorer.app.features.studies.folders import StudyFolders
-from explorer.app.features.studies.state import Brush, within
+from explorer.app.features.studies.state import Brush, brush_axes, open_study, pick_design, within
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import draw_page, open_page, settle, stable_picture
 from explorer.app.server import FIRST_DESIGN, Running, start

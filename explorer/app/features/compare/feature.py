@@ -10,9 +10,8 @@ from html import escape
 import viser
 
 from explorer.app.features.compare.scene import SCENES
-from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.compare.table import ComparedDesign, columns_of, notes, table
-from explorer.app.features.compare.work import FEEDS
+from explorer.app.features.compare.work import FEEDS, SLOTS, Compared
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.session.session import Change

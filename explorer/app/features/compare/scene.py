@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.app.features.compare import work
-from explorer.app.features.compare.state import Compared
-from explorer.app.features.compare.work import LIVE, NAMES
+from explorer.app.features.compare.work import LIVE, NAMES, Compared
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import COMPARED, NO_MESH, add_label, add_lines, add_translucent

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from explorer.app.features.compare.state import Compared
-from explorer.app.features.compare.work import LIVE, NAMES, CompareFeed, drawing_in
+from explorer.app.features.compare.work import LIVE, NAMES, Compared, CompareFeed, drawing_in
 from explorer.app.scene.shapes import COMPARED
 from explorer.app.state.state import State
 from explorer.app.widgets import markup

@@ -1,4 +1,4 @@
-"""The measurements and drawings of the compared designs: the worker's task, and their feeds.
+"""The compared designs: a part of the state, the worker's measurements and drawings, and feeds.
 
 Each column has a feed of its own, so that a slider requests the live design alone. Nothing is
 requested while there is nothing to compare.
@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TypeAlias
 
-from explorer.app.features.compare.state import SLOTS, Compared
 from explorer.app.features.workspace.work import LIVE_TOLERANCE
 from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
 from explorer.app.session.feed import Feed, FeedOf
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import without_name
+from explorer.app.state.parts import FeaturePart
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
@@ -27,6 +27,44 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.solids.solids import whole_solid
+
+SLOTS = ("A", "B", "C")
+"""Names of the places for pinned designs."""
+
+Pinned: TypeAlias = tuple[Design | None, Design | None, Design | None]
+
+
+@dataclass(frozen=True)
+class CompareView:
+    """How designs are compared in the scene: by their workspaces over one another, by outlines."""
+
+    overlay: bool = False
+    outlines: bool = False
+
+
+@dataclass(frozen=True)
+class Compared(FeaturePart, name="compared"):
+    """The designs that the live one is compared with, and how.
+
+    Copies of designs are pinned in the order of `SLOTS`; None where a place is free.
+    """
+
+    pinned: Pinned = (None, None, None)
+    look: CompareView = CompareView()
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is pinned."""
+        return not any(self.pinned)
+
+    def slot_of(self, design: Design) -> int | None:
+        """Return the index of the place of a design under any name; None if it is not pinned."""
+        plain = without_name(design)
+        slots = (
+            i for i, pinned in enumerate(self.pinned) if pinned and without_name(pinned) == plain
+        )
+        return next(slots, None)
+
 
 LIVE, NAMES = 0, ("live", *SLOTS)
 """The column of the live design, and the short names of all columns."""

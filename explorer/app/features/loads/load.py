@@ -29,6 +29,11 @@ if TYPE_CHECKING:
     # The worker imports this module, and needs nothing of the page.
     from explorer.app.features.feature import Services
 
+from explorer.export.tables import tolerance_csv
+from explorer.measures.box import PositionSet, positions_over
+from explorer.mechanism.configuration import Configuration
+from explorer.statics.budget import SourceCosts, ToleranceBudget, source_costs, tolerance_budget
+
 # Share of the reach below which and above which the arrow of a typed force has another scale.
 SHORTEST, LONGEST = 0.1, 1.0
 # Force in newtons below which the scale stays.
@@ -149,3 +154,56 @@ def nearest_feed(services: Services) -> Feed[LoadedPose, NearestDrawing]:
         return loaded if has_limits(loaded.design) and loaded.share > 1.0 else None
 
     return FeedOf(nearest_position, request_of)(services)
+
+
+@dataclass(frozen=True)
+class BudgetRequest:
+    """A request for a budget over positions in the orientation of a pose, or at the pose itself.
+
+    The tool's largest displacement that is wanted is in mm, None for the costs alone; its largest
+    turn in degrees, None for any.
+    """
+
+    design: Design
+    over: PositionSet
+    pose: Pose
+    box: tuple[Triple, Triple] | None
+    wanted: float | None
+    wanted_turn: float | None
+    keep_actuators: bool
+
+
+@dataclass(frozen=True)
+class BudgetDrawing:
+    """A budget: the costs of the tolerances found, or else stated; None found if none is wanted."""
+
+    request: BudgetRequest
+    costs: SourceCosts
+    found: ToleranceBudget | None
+
+
+def budget_of(request: BudgetRequest) -> BudgetDrawing:
+    """Return a budget.
+
+    Raises:
+        ExplorerError: Errors are infinite at the positions, no position is within the limits, or
+            the errors of the actuators alone exceed what is wanted.
+    """
+    design, pose = request.design, request.pose
+    positions = positions_over(design, request.over, pose, request.box)
+    at = Configuration(design, positions, pose.rotation, design.tool.position)
+    if request.wanted is None:
+        return BudgetDrawing(request, source_costs(at), None)
+    found = tolerance_budget(
+        at, request.wanted, request.wanted_turn, keep_actuators=request.keep_actuators
+    )
+    return BudgetDrawing(request, found.costs, found)
+
+
+def budget_table(request: BudgetRequest) -> bytes:
+    """Return the tolerances of a budget as CSV.
+
+    Raises:
+        ExplorerError: As for `budget_of`.
+    """
+    return tolerance_csv(budget_of(request).costs).encode()

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 
 from explorer.app.features.feature import FileExport, Services, html_of, show_html
-from explorer.app.features.loads import budget as tasks
+from explorer.app.features.loads import load as tasks
 from explorer.app.features.loads.load import Loads
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls

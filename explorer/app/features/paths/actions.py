@@ -1,25 +1,31 @@
-"""Actions on paths, which make and play one, and the task of the planner's own process."""
+"""Actions on paths, which make and play one, and the tasks on paths of other processes."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TypeAlias
 
 from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.features.paths.state import Journey, Paths, StopAt, journey_of
 from explorer.app.features.paths.stops import poses_of, stops_of
+from explorer.app.session.feed import FeedOf
 from explorer.app.state.actions import Set, action
 from explorer.app.state.moves import move_to
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.state.view import Weighed
-from explorer.errors import InputError
+from explorer.errors import ExplorerError, InputError
+from explorer.export.drawings.drives import force_speed_chart, time_charts
+from explorer.export.drawings.markup import as_html
 from explorer.legs.moves import StraightMoves
+from explorer.measures.blocks.block import Block
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.number_text import format_number
+from explorer.paths.drives import TimedPath, drive_blocks, drives_along
 from explorer.paths.planning import plan_path
 from explorer.statics.loaded import LoadedPose
 
@@ -173,3 +179,34 @@ def plan(
             corners += path.poses[1:]
         places.append(len(corners) - 1)
     return tuple(corners), tuple(places)
+
+
+DrivesRequest: TypeAlias = tuple[Design, TimedPath]
+"""A path of a design."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrivesDrawing:
+    """The actuators' speeds, forces and powers along a path, and the charts as SVG."""
+
+    blocks: tuple[Block, ...]
+    charts: str
+
+
+def request_for(state: State) -> DrivesRequest | None:
+    """Return the path of a state in its time; None without a path."""
+    journey = journey_of(state)
+    return None if journey is None else (journey.design, journey.path)
+
+
+def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:
+    """Return the actuators' speeds, forces and powers along a path, or why there are none."""
+    try:
+        found = drives_along(*request)
+    except ExplorerError as error:
+        return error
+    charts = "".join(as_html(chart) for chart in (time_charts(found), force_speed_chart(found)))
+    return DrivesDrawing(tuple(drive_blocks(found)), charts)
+
+
+DRIVES_FEED = FeedOf(draw_drives, lambda frame: request_for(frame.state))

@@ -9,11 +9,10 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, Tab, show
-from explorer.app.features.paths.actions import advance_journey, plan, play, take_plan
+from explorer.app.features.paths.actions import DRIVES_FEED, advance_journey, plan, play, take_plan
 from explorer.app.features.paths.panel import PathsPanel, slow_words
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
 from explorer.app.features.paths.stops import stops_in_table, stops_of
-from explorer.app.features.paths.work import DRIVES_FEED
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_label, add_lines
 from explorer.app.state.actions import Action

@@ -10,9 +10,9 @@ import viser
 
 from explorer.app.features.feature import Services, html_of, show_html
 from explorer.app.features.paths import actions, plots, stops
+from explorer.app.features.paths.actions import DRIVES_FEED, DrivesDrawing
 from explorer.app.features.paths.editor import StopsEditor
 from explorer.app.features.paths.state import PathKind, Paths, journey_of
-from explorer.app.features.paths.work import DRIVES_FEED, DrivesDrawing
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span

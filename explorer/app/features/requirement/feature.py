@@ -10,8 +10,7 @@ from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.requirement import words
 from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import RequiredBox
-from explorer.app.features.requirement.state import FORM, Required, open_found
-from explorer.app.features.requirement.work import CHECK_FEED
+from explorer.app.features.requirement.state import CHECK_FEED, FORM, Required, open_found
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import MAIN, Controls
 from explorer.app.session.session import Who

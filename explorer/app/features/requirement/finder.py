@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from explorer.app.features.feature import Services
-from explorer.app.features.requirement.state import EXAMPLE
-from explorer.app.features.requirement.work import CHECK_FEED, find_machines
+from explorer.app.features.requirement.state import CHECK_FEED, EXAMPLE, find_machines
 from explorer.app.session.session import Who
 from explorer.find.answers import FoundDesigns
 from explorer.find.requirement import Requirement

@@ -1,13 +1,19 @@
-"""The requirement's part of the state, and the action that opens a machine that was found."""
+"""The requirement's part of the state, with its action, and the check and search in processes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from explorer.app.session.feed import FeedOf
 from explorer.app.state.actions import action, open_design
+from explorer.app.state.frame import Frame
 from explorer.app.state.parts import FeaturePart, with_value
 from explorer.app.state.state import State
+from explorer.find.answers import FoundDesigns, RequirementCheck
+from explorer.find.check import check_requirement
+from explorer.find.nearest import find_or_relax
 from explorer.find.requirement import RequiredLegs, RequiredLoad, Requirement
+from explorer.jobs.process import Channel
 from explorer.mechanism.design import Design
 
 FORM = "required.form"
@@ -45,3 +51,21 @@ def open_found(state: State, design: Design, requirement: Requirement) -> State:
     """Open a design that was found, with the requirement that it keeps beside it."""
     opened = open_design(design).apply(state)
     return with_value(opened, "required", Required(requirement, True))
+
+
+def check_design(request: tuple[Design, Requirement]) -> RequirementCheck:
+    """Return the check of a design against a requirement."""
+    return check_requirement(*request)
+
+
+def _request_for(frame: Frame) -> tuple[Design, Requirement] | None:
+    required = Required.of(frame.state).requirement
+    return None if required is None or frame.state.busy else (frame.state.design, required)
+
+
+CHECK_FEED = FeedOf(check_design, _request_for, process="check", in_scene=False)
+
+
+def find_machines(requirement: Requirement, channel: Channel) -> FoundDesigns:
+    """Search for machines that keep a requirement, and send what is found so far to the parent."""
+    return find_or_relax(requirement, watch=channel.send, stop=channel.is_cancelled)

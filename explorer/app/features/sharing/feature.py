@@ -12,7 +12,7 @@ import viser
 
 from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
 from explorer.app.features.optimise.state import Optimisation
-from explorer.app.features.paths.work import request_for
+from explorer.app.features.paths.actions import request_for
 from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.features.requirement.state import Required
 from explorer.app.features.sharing import scene_files

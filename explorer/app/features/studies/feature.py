@@ -14,12 +14,6 @@ import msgspec
 import viser
 
 from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
-from explorer.app.features.studies.actions import (
-    brush_axes,
-    free_axes,
-    open_study,
-    pick_design,
-)
 from explorer.app.features.studies.figures import PlotName, brushes_in, reading_of, row_at
 from explorer.app.features.studies.folders import keep_study, study_folders
 from explorer.app.features.studies.state import (
@@ -28,7 +22,11 @@ from explorer.app.features.studies.state import (
     Brush,
     Studies,
     StudyPlan,
+    brush_axes,
+    free_axes,
     label_of,
+    open_study,
+    pick_design,
 )
 from explorer.app.features.studies.words import BUTTONS, acts, chips, head, legend, table
 from explorer.app.features.studies.work import study_feed, study_runner

@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from explorer.app.features.studies.actions import open_study
 from explorer.app.features.studies.feed import StudyFeed
 from explorer.app.features.studies.folders import keep_study, study_folders, study_in
-from explorer.app.features.studies.state import Studies, StudyPlan, study_around
+from explorer.app.features.studies.state import Studies, StudyPlan, open_study, study_around
 from explorer.app.session.session import Session, Who
 from explorer.errors import ExplorerError
 from explorer.files.extras import check_extra
