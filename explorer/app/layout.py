@@ -146,8 +146,8 @@ class Bar:
     """The bar on top of the page, with the parts of the features side by side."""
 
     def __init__(self, services: Services, features: Sequence[Feature]) -> None:
-        declared = [part for feature in features for part in feature.bar]
-        self._parts = [(each.side, each.part(services)) for each in declared]
+        declared = [each for feature in features for each in feature.bar]
+        self._parts = [(side, make(services)) for side, make in declared]
         self._html = services.gui.add_html("")
 
     def updates(self, frame: Frame) -> Iterator[Update]:

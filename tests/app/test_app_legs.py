@@ -16,7 +16,7 @@ import trimesh
 from desk import Desk, by_name, number, random_states, rows_of as rows_below_head, thick, viewed
 from services import StubJobs, services_for
 
-from explorer.app.features.feature import FeedProtocol, Services
+from explorer.app.features.feature import Follower, Services
 from explorer.app.features.legs.feature import (
     ClearanceScene,
     SweptTetrahedra,
@@ -58,7 +58,7 @@ pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
 RADIUS = 0.2
-Followed = TypeVar("Followed", bound=FeedProtocol)
+Followed = TypeVar("Followed", bound=Follower)
 # Rows of the rotation at home.
 LEVEL = work.rows_of(open_state(OPTIMAL).pose.rotation)
 

@@ -15,7 +15,7 @@ import zstandard
 
 from explorer.app.features.sharing.scene_files import (
     MOST,
-    FileCamera,
+    camera_messages,
     caption_of,
     double_size,
     scene_html,
@@ -29,7 +29,8 @@ from explorer.mechanism.design_file import PRESETS
 
 OPTIMAL = PRESETS["paper-optimal"]
 DATE = dt.date(2031, 2, 3)
-EYE = FileCamera(np.array([12.0, -9.0, 7.5]), np.array([1.0, 2.0, 3.0]), 0.5)
+EYE, TARGET, ANGLE = (12.0, -9.0, 7.5), (1.0, 2.0, 3.0), 0.5
+CAMERA = camera_messages(np.array(EYE), np.array(TARGET), ANGLE)
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Packed:
 
 
 def test_scene_page_holds_what_is_seen_and_nothing_else(running: Running) -> None:
-    packed = Packed.of(scene_html(running.viser, running.page.session.state, EYE, date=DATE))
+    packed = Packed.of(scene_html(running.viser, running.page.session.state, CAMERA, date=DATE))
     # What draws labels and views without perspective comes along.
     kept = {
         "BackgroundImageMessage",
@@ -75,9 +76,9 @@ def test_scene_page_holds_what_is_seen_and_nothing_else(running: Running) -> Non
     for hidden in ("/ghosts/", "/twin/", "/path/", "/workspace/", "/handle"):
         assert not packed.named(hidden)
     cameras = {m["type"]: m for m in packed.messages if m["type"].startswith("SetCamera")}
-    assert cameras["SetCameraPositionMessage"]["position"] == EYE.position.tolist()
-    assert cameras["SetCameraLookAtMessage"]["look_at"] == EYE.look_at.tolist()
-    assert cameras["SetCameraFovMessage"]["fov"] == EYE.fov
+    assert cameras["SetCameraPositionMessage"]["position"] == [*EYE]
+    assert cameras["SetCameraLookAtMessage"]["look_at"] == [*TARGET]
+    assert cameras["SetCameraFovMessage"]["fov"] == ANGLE
     assert all(m["initial"] for m in cameras.values())
     assert "<title>paper-optimal – " in packed.text
     assert "2031-02-03" in packed.text
@@ -92,7 +93,7 @@ def test_scene_page_holds_what_is_shown_by_then_and_ends_its_recording(
     session = running.page.session
     session.do(Set("view", View(ghosts=True, labels=False)))
     assert session.wait_until_idle()
-    packed = Packed.of(scene_html(running.viser, session.state, EYE, date=DATE))
+    packed = Packed.of(scene_html(running.viser, session.state, CAMERA, date=DATE))
     assert packed.named("/ghosts/")
     names = [m["name"] for m in packed.messages if m["type"] == "LabelMessage"]
     assert set(names) == {"/ground/scale", *(f"/ghosts/name/{index}" for index in range(7))}

@@ -6,7 +6,6 @@ A feature is a folder beside this module. It declares all that it adds to the pa
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -219,20 +218,16 @@ class Panel(Protocol):
         ...
 
 
-class FeedProtocol(Protocol):
+class Follower(Protocol):
     """Requests drawings from the process of the page, before the frame is drawn."""
 
-    def follow(self, frame: Frame) -> None:
-        """Request what a frame needs, unless it is requested already."""
+    def follow(self, frame: Frame, /) -> None:
+        """Request what a frame needs, or begin or end the work that it requests, once."""
         ...
 
 
-class Runner(ABC):
+class Runner(Follower, Protocol):
     """Does long work that the state requests, after the frame is drawn."""
-
-    @abstractmethod
-    def follow(self, frame: Frame) -> None:
-        """Begin or end the work that a frame requests."""
 
     def prepare(self) -> None:
         """Start the process that the work will need, in the background."""
@@ -265,18 +260,8 @@ class Tab:
 BarPart = Callable[[Frame], str]
 """A part of the bar on top of the page: its HTML for a frame."""
 
-
-@dataclass(frozen=True)
-class InBar:
-    """The declaration of a part of the bar on top of the page.
-
-    Attributes:
-        side: Where in the bar it stands; parts of one side keep the order of the features.
-        part: Function that makes the part, such as the class of one that needs services.
-    """
-
-    side: Side
-    part: Callable[[Services], BarPart]
+InBar = tuple[Side, Callable[["Services"], BarPart]]
+"""The side of the bar on which a part stands, in the order of the features, and what makes it."""
 
 
 @dataclass(frozen=True)
@@ -327,8 +312,8 @@ class Feature:
     exports: tuple[FileExport, ...] = ()
     openers: Mapping[str, Opener] = field(default_factory=dict[str, Opener])
     scene: tuple[Callable[[Services], ScenePart], ...] = ()
-    feeds: tuple[Callable[[Services], FeedProtocol], ...] = ()
-    later_feeds: tuple[Callable[[Services], FeedProtocol], ...] = ()
+    feeds: tuple[Callable[[Services], Follower], ...] = ()
+    later_feeds: tuple[Callable[[Services], Follower], ...] = ()
     runners: tuple[Callable[[Services], Runner], ...] = ()
     commands: tuple[StateCommand, ...] = ()
     passing: Callable[[Services], tuple[Command, ...]] | None = None

@@ -7,7 +7,7 @@ from html import escape
 
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, Tab
+from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.help.search import TITLE, SearchDialog
 from explorer.app.features.help.tour import TourGuide
 from explorer.app.state.frame import Frame
@@ -109,6 +109,6 @@ def _row(words: str, caps: str) -> str:
 HELP = Feature(
     "help",
     tabs=(Tab("dialog", "Help", HelpDialog), Tab("dialog", TITLE, SearchDialog)),
-    bar=(InBar("right", HelpButtons),),
+    bar=(("right", HelpButtons),),
     runners=(TourGuide,),
 )

@@ -12,7 +12,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.designs.feature import SavedDesigns
-from explorer.app.features.feature import Feature, InBar, Services, Tab
+from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.workspace.feeds import VOLUME_FEED, volume_request
 from explorer.app.features.workspace.work import MeasuredVolume, Selection, measure_volume
 from explorer.app.scene.placing import Placed, ScenePart, outline
@@ -300,8 +300,8 @@ HISTORY = Feature(
     "history",
     tabs=(Tab("dialog", "History", HistoryPanel),),
     bar=(
-        InBar("left", UndoButtons),
-        InBar("left", lambda services: services.get(DesignChange).card),
+        ("left", UndoButtons),
+        ("left", lambda services: services.get(DesignChange).card),
     ),
     scene=(ChangeScene,),
     feeds=(DesignChange,),

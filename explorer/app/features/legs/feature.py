@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from explorer.app.features.feature import Feature, InBar, Services, Tab, show, show_html
+from explorer.app.features.feature import Feature, Services, Tab, show, show_html
 from explorer.app.inputs.controls import Controls
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import (
@@ -169,7 +169,7 @@ class SweptTetrahedra(ScenePart):
 LEGS = Feature(
     "legs",
     tabs=(Tab("analyse", "Workspace", ClearancePanel),),
-    bar=(InBar("middle", lambda _: clearance_figure),),
+    bar=(("middle", lambda _: clearance_figure),),
     verdicts={
         "Legs are clear": "No two legs meet, their radii included.",
         "Legs touch": "It is not certain that two legs stay apart, their radii included.",

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import viser
 
-from explorer.app.features.feature import BarPart, Feature, InBar, Services, Tab, show_html
+from explorer.app.features.feature import BarPart, Feature, Services, Tab, show_html
 from explorer.app.features.loads import load, precision
 from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEllipsoidScene
 from explorer.app.features.loads.scene import ForcesScene, LoadHandle
@@ -215,7 +215,7 @@ LOADS = Feature(
         Tab("analyse", "Loads", ForcesPanel, viser.Icon.ARROW_DOWN_CIRCLE),
         Tab("analyse", "Loads", precision.PrecisionPanel),
     ),
-    bar=(InBar("middle", load_figure),),
+    bar=(("middle", load_figure),),
     verdicts={
         "Holds the load": "No part bears more than its limit.",
         "Does not hold the load": "A part would bear more than its limit.",

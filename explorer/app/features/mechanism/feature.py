@@ -9,7 +9,7 @@ from typing import get_args
 import viser
 
 from explorer.app.features.designs.feature import DesignName
-from explorer.app.features.feature import Feature, InBar, Services, Tab, show_html
+from explorer.app.features.feature import Feature, Services, Tab, show_html
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs, TwinLegs
 from explorer.app.features.mechanism.folds import Leaves, add_fold_sliders
 from explorer.app.features.mechanism.incidences import Gaps, Tetrahedra
@@ -322,7 +322,7 @@ MECHANISM = Feature(
         Tab("build", "Pose", MovePanel, viser.Icon.ARROWS_MOVE),
         Tab("build", "Design", DesignPanel, viser.Icon.RULER_2),
     ),
-    bar=(InBar("left", DesignName), InBar("middle", lambda _: limits_figure)),
+    bar=(("left", DesignName), ("middle", lambda _: limits_figure)),
     verdicts={
         "Limits kept": "The pose keeps all limits of the design.",
         "Limits broken": "The pose is outside limits of the design, such as a length of a leg.",

@@ -8,7 +8,7 @@ from html import escape
 
 import viser
 
-from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
+from explorer.app.features.feature import Feature, FileExport, Services, Tab
 from explorer.app.features.optimise.actions import SetObjective
 from explorer.app.features.optimise.buttons import ACCEPT, add_buttons, button
 from explorer.app.features.optimise.runner import Optimiser
@@ -237,7 +237,7 @@ OPTIMISE = Feature(
     "optimise",
     manual="optimise.md#On the page",
     tabs=(Tab("work", "Optimise", OptimisePanel, viser.Icon.SPARKLES),),
-    bar=(InBar("right", lambda _: search_chip),),
+    bar=(("right", lambda _: search_chip),),
     verdicts=VERDICTS,
     exports=(
         FileExport(

@@ -8,7 +8,7 @@ from threading import Thread
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Runner, Services, Tab, show
+from explorer.app.features.feature import Feature, Runner, Services, Tab, show
 from explorer.app.features.paths.actions import DRIVES_FEED, advance_journey, plan, play, take_plan
 from explorer.app.features.paths.panel import PathsPanel, slow_words
 from explorer.app.features.paths.state import Journey, Paths, is_playing, journey_of
@@ -174,7 +174,7 @@ PATHS = Feature(
     "paths",
     manual="singularity.md#Paths",
     tabs=(Tab("work", "Paths", PathsPanel, viser.Icon.ROUTE),),
-    bar=(InBar("right", lambda _: path_chip),),
+    bar=(("right", lambda _: path_chip),),
     verdicts={
         "No singular pose": "The path crosses no singular pose.",
         "Singular once": "The path goes through a singular pose, where the platform is not held.",

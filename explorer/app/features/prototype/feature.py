@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab, show_html
+from explorer.app.features.feature import Feature, FileExport, Services, Tab, show_html
 from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype import work
 from explorer.app.features.prototype.building import (
@@ -255,7 +255,7 @@ PROTOTYPE = Feature(
     "prototype",
     manual="prototype-and-export.md",
     tabs=(Tab("analyse", "Prototype", PrototypePanel, viser.Icon.ENGINE),),
-    bar=(InBar("middle", lambda services: services.get(BuildVerdict).in_bar),),
+    bar=(("middle", lambda services: services.get(BuildVerdict).in_bar),),
     verdicts=VERDICTS,
     exports=(
         FileExport(

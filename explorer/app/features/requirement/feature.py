@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, Tab
+from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.requirement import words
 from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import RequiredBox
@@ -230,7 +230,7 @@ REQUIREMENT = Feature(
     manual="requirements.md",
     tabs=(Tab("dialog", words.TITLE, RequirementPanel),),
     verdicts=words.VERDICTS,
-    bar=(InBar("left", lambda _: lambda __: OPENS), InBar("left", Checklist)),
+    bar=(("left", lambda _: lambda __: OPENS), ("left", Checklist)),
     scene=(RequiredBox,),
     later_feeds=(CHECK_FEED,),
     openers={"box_mm": open_requirement},

@@ -10,7 +10,7 @@ from html import escape
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
+from explorer.app.features.feature import Feature, FileExport, Services, Tab
 from explorer.app.features.optimise.state import Optimisation
 from explorer.app.features.paths.actions import request_for
 from explorer.app.features.prototype.building import BuildVerdict
@@ -98,7 +98,7 @@ def send_scene(services: Services, who: Who) -> None:
     def make(client: viser.ClientHandle) -> File:
         state, date = services.session.latest_state(), dt.datetime.now().astimezone().date()
         eye = client.camera
-        camera = scene_files.FileCamera(eye.position, eye.look_at, float(eye.fov))
+        camera = scene_files.camera_messages(eye.position, eye.look_at, float(eye.fov))
         theme, dark = services.theme, services.theme.is_dark_for(who)
         data = scene_files.scene_html(
             services.server, state, camera, theme.messages(dark=dark), date=date, dark=dark
@@ -230,7 +230,7 @@ SHARING = Feature(
     "sharing",
     manual="cad.md",
     tabs=(Tab("dialog", "Export", ExportDialog),),
-    bar=(InBar("right", ShareButtons),),
+    bar=(("right", ShareButtons),),
     exports=(
         FileExport(
             "Report",

@@ -12,7 +12,6 @@ import datetime as dt
 import io
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from html import escape
 from itertools import accumulate
 
@@ -54,31 +53,26 @@ CAPTION_STYLE = (
 )
 
 
-@dataclass(frozen=True)
-class FileCamera:
-    """The camera of the opened file in scene units; the vertical angle of view is in radians."""
+def camera_messages(position: FloatArray, look_at: FloatArray, fov: float) -> list[SceneMessage]:
+    """Return the messages that set the camera of the opened file, also when its view is reset.
 
-    position: FloatArray
-    look_at: FloatArray
-    fov: float
-
-    def messages(self) -> list[SceneMessage]:
-        """Return the messages that set the camera, also when its view is reset."""
-        return [
-            {"type": f"SetCamera{part}Message", field: value, "initial": True}
-            for part, field, value in (
-                ("Position", "position", tuple(self.position.tolist())),
-                ("LookAt", "look_at", tuple(self.look_at.tolist())),
-                ("UpDirection", "position", (0.0, 0.0, 1.0)),
-                ("Fov", "fov", self.fov),
-            )
-        ]
+    Places (3,) are in scene units, the vertical angle of view is in radians.
+    """
+    return [
+        {"type": f"SetCamera{part}Message", field: value, "initial": True}
+        for part, field, value in (
+            ("Position", "position", tuple(position.tolist())),
+            ("LookAt", "look_at", tuple(look_at.tolist())),
+            ("UpDirection", "position", (0.0, 0.0, 1.0)),
+            ("Fov", "fov", fov),
+        )
+    ]
 
 
 def scene_html(
     server: viser.ViserServer,
     state: State,
-    camera: FileCamera,
+    camera: Sequence[SceneMessage],
     colours: Sequence[SceneMessage] = (),
     *,
     date: dt.date,
@@ -93,7 +87,7 @@ def scene_html(
     ]
     page = scene_as_html(
         server,
-        lambda all_: [*visible_messages([*all_, *colours]), *camera.messages(), *scripts],
+        lambda all_: [*visible_messages([*all_, *colours]), *camera, *scripts],
         dark=dark,
     )
     title = f"{state.design.name} – flagged 4-4 manipulator"

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, Tab, show_html
+from explorer.app.features.feature import Feature, Services, Tab, show_html
 from explorer.app.features.mechanism.incidences import HOVER, margin_hover
 from explorer.app.features.singularity import scene, work
 from explorer.app.inputs.bindings import At
@@ -372,7 +372,7 @@ SINGULARITY = Feature(
     "singularity",
     manual="singularity.md#Verdict",
     tabs=(Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),),
-    bar=(InBar("middle", lambda _: distance_figure),),
+    bar=(("middle", lambda _: distance_figure),),
     verdicts={TITLES[kind]: meaning for kind, meaning in MEANINGS.items()},
     scene=(scene.NearestGhost, scene.EllipsoidScene, scene.BallScene, scene.FreeMotion),
     later_feeds=(work.STRATA_FEED,),

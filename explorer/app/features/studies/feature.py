@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab
+from explorer.app.features.feature import Feature, FileExport, Services, Tab
 from explorer.app.features.studies.figures import PlotName, brushes_in, reading_of, row_at
 from explorer.app.features.studies.folders import keep_study, study_folders
 from explorer.app.features.studies.state import (
@@ -341,7 +341,7 @@ STUDIES = Feature(
     "studies",
     manual="studies.md",
     tabs=(Tab("work", "Studies", StudiesPanel, viser.Icon.CHART_DOTS),),
-    bar=(InBar("right", StudyChip),),
+    bar=(("right", StudyChip),),
     later_feeds=(study_feed,),
     exports=(
         FileExport(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, Tab, show
+from explorer.app.features.feature import Feature, Services, Tab, show
 from explorer.app.features.mechanism import bodies
 from explorer.app.inputs.controls import Controls
 from explorer.app.scene.camera import VIEWS, ViewName
@@ -297,7 +297,7 @@ VIEW = Feature(
     "view",
     manual="page.md",
     tabs=(Tab("dialog", OVERLAYS, OverlaysMenu),),
-    bar=(InBar("right", ViewButtons),),
+    bar=(("right", ViewButtons),),
     scene=(Ground,),
     commands=(
         StateCommand(

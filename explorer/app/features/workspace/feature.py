@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.features.feature import Feature, FileExport, InBar, Services, Tab, show_html
+from explorer.app.features.feature import Feature, FileExport, Services, Tab, show_html
 from explorer.app.features.workspace import feeds, words as texts, work
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
@@ -319,7 +319,7 @@ WORKSPACE = Feature(
     "workspace",
     manual="workspace.md",
     tabs=(Tab("analyse", "Workspace", WorkspacePanel, viser.Icon.SPHERE),),
-    bar=(InBar("middle", volume_figure),),
+    bar=(("middle", volume_figure),),
     verdicts={
         "The workspace is empty": "No position keeps all limits in this orientation.",
         "No position holds the load": "At every position a part bears more than its limit.",
