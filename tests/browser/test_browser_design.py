@@ -201,4 +201,4 @@ def test_row_in_use_is_marked_in_the_sketch_and_its_hint_stands_beside_the_panel
     assert is_marked()
     tab.field("b1x").blur()
     tab.wait_for(lambda: not is_marked(), "no mark of the row that has lost the focus")
-    assert tab.page.evaluate("document.documentElement.dataset.at") == "b2"
+    expect(tab.page.locator(".ex-sketch .is-here")).to_have_attribute("data-variable", "b2")

@@ -136,11 +136,13 @@ window.explorer.names ??= (() => {
     { subtree: true, attributeFilter: ["aria-valuenow"] },
   );
   nameAll();
-  // What has the focus, or else the pointer, is named on the root: the stylesheet may point at it.
+  // What has the focus, or else the pointer, is marked in the sketch of the design variables.
   let pointed = null;
   const mark = () => {
-    const words = [document.activeElement, pointed].map(labelOf);
-    document.documentElement.dataset.at = words.find((each) => each) ?? "";
+    const words = labelOf(document.activeElement) || labelOf(pointed);
+    for (const each of document.querySelectorAll("[data-variable]")) {
+      each.classList.toggle("is-here", each.dataset.variable === words);
+    }
   };
   const pointAt = ({ target }) => {
     pointed = target;

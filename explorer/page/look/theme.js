@@ -6,8 +6,9 @@ window.explorer.theme ??= (() => {
   const system = matchMedia("(prefers-color-scheme: dark)");
   const nameOf = (isDark) => (isDark ? "dark" : "light");
   let choice = recall(KEY) ?? "system";
+  const SIGNS = { system: "◐", dark: "☾", light: "☀" };
   const send = () => {
-    document.documentElement.dataset.exTheme = choice;
+    document.documentElement.style.setProperty("--ex-theme", `"${SIGNS[choice]}"`);
     press("theme", choice === "system" ? nameOf(system.matches) : choice);
   };
   system.addEventListener("change", send);
