@@ -78,6 +78,7 @@ SCRIPTS = (
     "projection",
     "labels",
     "layers",
+    "map",
     "notices",
 )
 # Title of a notice that a request is refused.

@@ -48,8 +48,8 @@ OPTIMAL = PRESETS["paper-optimal"]
 HOME = tilt_torsion_of(OPTIMAL.home_pose.rotation)
 
 
-def facts_of(markup: str, name: str = "tilts") -> dict[str, Any]:
-    (found,) = re.findall(rf'data-{name}="([^"]+)"', markup)
+def facts_of(markup: str) -> dict[str, Any]:
+    (found,) = re.findall('data-map="([^"]+)"', markup)
     return json.loads(unescape(found))
 
 
@@ -118,14 +118,16 @@ def test_map_draws_each_tilt_at_its_place_in_the_colour_of_its_limit() -> None:
     least = greatest_tilt(OPTIMAL, (10.0, 5.0, 9.0))
     markup = maps.polar_map(tilts, least, here, HOME)
     facts = facts_of(markup)
-    assert facts == {
-        "centre": list(maps.CENTRE),
-        "radius": maps.RADIUS,
-        "edge": maps.edge_of(tilts, here, HOME),
-    }
+    edge = maps.edge_of(tilts, here, HOME)
+    # The frame is about the circle, in whose centre there is no tilt.
+    left, bottom, scale = facts["place"]
+    centre = left - facts["lows"][0] * scale, bottom + facts["lows"][1] * scale
+    assert centre == pytest.approx(maps.CENTRE)
+    assert facts["radius"] == facts["highs"][0] == facts["highs"][1] == edge
+    assert scale * edge == pytest.approx(maps.RADIUS)
     (pairs,) = re.findall(r'class="possible" d="M([^"]+)Z"', markup)
     points = np.array([pair.split(",") for pair in pairs.split("L")], dtype=float)
-    distances, angles = maps.RADIUS * tilts.tilts / facts["edge"], np.radians(tilts.azimuths)
+    distances, angles = maps.RADIUS * tilts.tilts / edge, np.radians(tilts.azimuths)
     expected = maps.CENTRE + distances[:, None] * np.stack(
         [np.cos(angles), -np.sin(angles)], axis=1
     )

@@ -26,7 +26,7 @@ def middle_of(tab: Tab, chart: Locator) -> tuple[float, float, float]:
 
 def test_platform_is_tilted_by_clicks_on_the_map_and_by_typed_angles(tab: Tab) -> None:
     tab.turn_to("Tilt")
-    chart = tab.page.locator("[data-tilts]")
+    chart = tab.page.locator(".ex-tilts[data-map]")
     torsion = angles(tab).torsion
     edge = edge_of(
         tilt_map(tab.state.design, tab.state.pose.position, torsion),

@@ -53,7 +53,7 @@ def move_cut(tab: Tab, level: float) -> None:
 
 
 def map_in(tab: Tab) -> Locator:
-    return tab.page.locator("[data-map]")
+    return tab.page.locator("[data-map]:not(.ex-tilts)")
 
 
 def rest_on(tab: Tab, across: float, up: float) -> Locator:

@@ -1,8 +1,9 @@
-// Shows what the server reads at the pointer on the map of a slice: it is sent the position as a press
-// of "workspace.read" and answers with a call. A click goes there, as a press of "workspace.go".
+// Shows what the server reads at the pointer on a map: it is sent the position as a press of "NAME.read"
+// by the name of the map, and answers with a call. A click goes there, as a press of "NAME.go".
 window.explorer.map ??= (() => {
   const mapAt = (target) => target?.closest?.("[data-map]") ?? null;
-  // The position in the base's frame at a place of the window over a map; null beside its frame.
+  // The position at a place of the window over a map, on both axes, and on that of the level of a
+  // slice; null beside its frame or the circle around its origin.
   const positionAt = (map, facts, { clientX, clientY }) => {
     const matrix = map.getScreenCTM();
     if (!matrix) return null;
@@ -10,7 +11,8 @@ window.explorer.map ??= (() => {
     const [left, bottom, scale] = facts.place;
     const p = [facts.lows[0] + (at.x - left) / scale, facts.lows[1] + (bottom - at.y) / scale];
     if (p.some((value, k) => value < facts.lows[k] || value > facts.highs[k])) return null;
-    p.splice(facts.axis, 0, facts.level);
+    if (Math.hypot(...p) > (facts.radius ?? Infinity)) return null;
+    if (facts.level !== undefined) p.splice(facts.axis, 0, facts.level);
     // A pixel is wider than the last decimal.
     return p.map((value) => Number(value.toFixed(facts.decimals)));
   };
@@ -33,18 +35,27 @@ window.explorer.map ??= (() => {
     if (!position) return null;
     const value = JSON.stringify(position);
     // The same position on another map is asked about again.
-    return { value, key: value + map.dataset.map, place: placeOf(facts, target) };
+    return {
+      map,
+      name: facts.name,
+      value,
+      key: value + map.dataset.map,
+      place: placeOf(facts, target),
+    };
   };
-  const show = () => window.explorer.tell(document.querySelector("[data-map]"), words);
+  const show = () => window.explorer.tell(found?.map, words);
   const ask = () => {
     asked = found;
-    window.explorer.press("workspace.read", asked.value);
+    window.explorer.press(`${asked.name}.read`, asked.value);
   };
   const update = () => {
     const before = found;
     found = find();
-    if (!found) asked = words = null;
-    else if (found.key !== before?.key && !asked) ask();
+    if (before?.name !== found?.name) {
+      window.explorer.tell(before?.map);
+      asked = words = null;
+    }
+    if (found && found.key !== before?.key && !asked) ask();
     show();
   };
   const follow = ({ clientX, clientY }) => {
@@ -58,7 +69,7 @@ window.explorer.map ??= (() => {
   }).observe(document.body, { childList: true, subtree: true, attributeFilter: ["data-map"] });
   addEventListener("click", ({ target }) => {
     // A click tells whole pixels, other than the pointer that read the map.
-    if (found && mapAt(target)) window.explorer.press("workspace.go", found.value);
+    if (found && mapAt(target)) window.explorer.press(`${found.name}.go`, found.value);
   });
   return (value, text) => {
     // The pointer may have left the map, and come back, meanwhile.

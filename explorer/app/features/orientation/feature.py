@@ -27,8 +27,8 @@ from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_decimals
 from explorer.page.browser.browser_facts import decode_text
-from explorer.page.browser.viser_gaps import run_script
-from explorer.page.look import read_script
+from explorer.page.browser.viser_gaps import run_script_in
+from explorer.page.look import call_script
 from explorer.page.widgets.assigning import Updates
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,
@@ -49,8 +49,8 @@ NO_NODES: BoolArray = np.zeros(0, dtype=np.bool_)
 # Tilt below which the azimuth has no effect, in degrees.
 LEVEL = 1e-6
 
-_Turn = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
-_TILT = msgspec.json.Decoder(tuple[_Turn, Annotated[float, msgspec.Meta(ge=0.0, le=180.0)]])
+_Angle = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
+_PLACE = msgspec.json.Decoder(tuple[_Angle, _Angle])
 
 
 class OrientationPanel:
@@ -82,7 +82,7 @@ class OrientationPanel:
             self._scale = gui.add_html("", visible=False)
             self._tilts_under_way = UnderWay(services, "tilts", self._tilts)
         services.do_on_press("orientation.go", _tilt)
-        run_script(services.server, read_script("tilts"))
+        services.buttons.on("orientation.read", _read)
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that show a frame."""
@@ -103,10 +103,27 @@ class OrientationPanel:
         yield from show_html(self._scale, box(scale) if state.view.tilts else "")
 
 
+def _angles_at(text: str) -> tuple[float, float] | None:
+    """Return azimuth and tilt at a place of the map that a page sent, in degrees."""
+    place: tuple[float, float] | None = decode_text(text, _PLACE)
+    if place is None:
+        return None
+    x, y = place
+    return round(math.degrees(math.atan2(y, x)), 1), min(180.0, round(math.hypot(x, y), 1))
+
+
 def _tilt(text: str) -> Action | None:
-    """Return the action that tilts the platform as a page sent it, (azimuth, tilt) in degrees."""
-    angles: tuple[float, float] | None = decode_text(text, _TILT)
+    """Return the action that tilts the platform to a place of the map."""
+    angles = _angles_at(text)
     return None if angles is None else work.go_to_tilt(*angles)
+
+
+def _read(text: str, client: viser.ClientHandle) -> None:
+    """Answer a browser that asks for the words at a place of the map."""
+    angles = _angles_at(text)
+    if angles is not None:
+        azimuth, tilt = map(_degrees, angles)
+        run_script_in(client, call_script("map", text, f"azimuth {azimuth}, tilt {tilt}"))
 
 
 def summary(

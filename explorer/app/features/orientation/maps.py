@@ -88,7 +88,11 @@ def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: Tilt
     It shows the greatest tilt by azimuth and in every azimuth, the present orientation and home.
     """
     edge = edge_of(tilts, here, home)
-    facts = {"centre": CENTRE, "radius": RADIUS, "edge": edge}
+    # What a script reads the position by, in degrees from the centre.
+    scale = RADIUS / edge
+    ends = {"lows": (-edge, -edge), "highs": (edge, edge), "radius": edge, "decimals": 2}
+    place = (CENTRE[0] - RADIUS, CENTRE[1] + RADIUS, scale)
+    facts = {"name": "orientation", "place": place, **ends}
     pieces = [*_rings(edge), *_region(tilts, edge), *_least(least, edge), *_labels(edge)]
     is_other = abs(math.remainder(home.torsion - here.torsion, 360.0)) > SAME_TORSION
     look = f"home{' is-other' if is_other else ''}"
@@ -103,7 +107,8 @@ def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: Tilt
             "Greatest tilt by azimuth",
             *pieces,
             viewBox=f"0 0 {WIDTH:g} {HEIGHT:g}",
-            data_tilts=msgspec.json.encode(facts).decode(),
+            data_within="",
+            data_map=msgspec.json.encode(facts).decode(),
         )
         + f'<div class="ex-dim">{key}</div>'
         + reading("Point at the map to read it, click to tilt there.")

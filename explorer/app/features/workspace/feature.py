@@ -33,8 +33,8 @@ from explorer.measures.verdict import warnings
 from explorer.mechanism.margins import MARGIN_KINDS
 from explorer.mechanism.pose import Pose, Triple
 from explorer.page.browser.browser_facts import decode_text
-from explorer.page.browser.viser_gaps import run_script, run_script_in
-from explorer.page.look import call_script, read_script
+from explorer.page.browser.viser_gaps import run_script_in
+from explorer.page.look import call_script
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key, shift
 
@@ -145,7 +145,6 @@ class WorkspacePanel:
             )
         services.do_on_press("workspace.go", _go_to)
         buttons.on("workspace.read", self._read)
-        run_script(services.server, read_script("map"))
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that show a frame."""

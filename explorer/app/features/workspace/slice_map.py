@@ -196,6 +196,7 @@ def map_picture(mapped: SliceMap, position: Triple, reach: float, unit: Unit) ->
         ruler(AXES[second], (f * v0, f * v1), bottom, scale / f, across=left, up=True),
     ]
     facts = {
+        "name": "workspace",
         "axis": AXES.index(mapped.axis),
         "level": mapped.level,
         "lows": mapped.lows,
