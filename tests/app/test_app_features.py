@@ -23,9 +23,10 @@ from server_clock import wait_until_drawn
 import explorer.app
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
+from explorer.app.features.help.guide import end_course
+from explorer.app.features.help.lessons import arrange
 from explorer.app.features.help.manual import list_entries
 from explorer.app.features.help.search import RUN, SearchDialog
-from explorer.app.features.help.tour import end_tour
 from explorer.app.features.history.feature import take_session
 from explorer.app.features.loads.load import WEIGHTS_FEED, set_force
 from explorer.app.features.machine.feature import set_tool_angle
@@ -274,7 +275,8 @@ OF_NOBODY = (
     end_run,
     compare,
     take_plan,
-    end_tour,
+    end_course,
+    arrange,
 )
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
@@ -348,7 +350,7 @@ def test_every_action_is_a_command_or_takes_a_value(running: Running, palette: P
     with record_requests(running.page.session) as requests:
         for label, command in labelled(palette).items():
             # The others do something to one browser, or send it a file.
-            if label in OF_BROWSERS or label.startswith(("Page › ", "Export › ")):
+            if label in OF_BROWSERS or label.startswith(("Page › ", "Export › ", "Lessons › ")):
                 continue
             command.run(CLIENT)
         saved = running.page.services.get(SavedDesigns)

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, FloatRect, Locator
 from tab import Tab
 
-from explorer.app.features.help.tour import STEPS
+from explorer.app.features.help.lessons import TOUR, list_courses
 from explorer.app.features.optimise.state import Optimisation
 from explorer.app.layout import DRAWER_HEIGHT, NARROW
 from explorer.app.scene.camera import framing
@@ -325,6 +325,9 @@ def is_dark(tab: Tab) -> bool:
 
 def scheme_of(tab: Tab) -> str:
     return str(tab.page.evaluate("document.documentElement.dataset.mantineColorScheme"))
+
+
+STEPS = list_courses()[TOUR].steps
 
 
 def test_tour_leads_through_five_steps_once(browser: Browser) -> None:

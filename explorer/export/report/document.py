@@ -39,7 +39,19 @@ def report_html(data: ReportData, date: dt.date) -> str:
 
     Equal data give equal reports, except for the date and the versions of the libraries.
     """
-    title = f"{data.design.name} – design report"
+    body = element("body", element("header", *_title_block(data, date), class_="cover"))
+    for section in _SECTIONS:
+        # The search, and what gives the report again, are in the unit of the design's file.
+        if data.filed and section is search_section:
+            markup.name_millimetres(body)
+        pieces = list(section(data))
+        if pieces:
+            body.append(element("section", *pieces))
+    return page_html(f"{data.design.name} – design report", body)
+
+
+def page_html(title: str, body: Element) -> str:
+    """Return a page with the looks of a report as HTML that needs no other file and no network."""
     style = packaged_file("export/report", "style.css").read_text("utf-8") + drawing_style()
     head = element(
         "head",
@@ -50,14 +62,6 @@ def report_html(data: ReportData, date: dt.date) -> str:
         element("title", title),
         element("style", style),
     )
-    body = element("body", element("header", *_title_block(data, date), class_="cover"))
-    for section in _SECTIONS:
-        # The search, and what gives the report again, are in the unit of the design's file.
-        if data.filed and section is search_section:
-            markup.name_millimetres(body)
-        pieces = list(section(data))
-        if pieces:
-            body.append(element("section", *pieces))
     return f"<!DOCTYPE html>\n{markup.as_html(element('html', head, body, lang='en-GB'))}\n"
 
 

@@ -1,5 +1,5 @@
-// Shows the card of the tour, turns to the tab of its step and rings the control that the step names.
-// Without a card it turns back to the tabs that were in front before the tour.
+// Shows the card of the tour or a lesson, turns to the tab of its step and rings the control that the
+// step names. Without a card it turns back to the tabs that were in front before.
 window.explorer.tour ??= (() => {
   const { recall, keep } = window.explorer;
   const DRAWER = "[data-floating-window][data-ex=drawer]";
@@ -7,7 +7,7 @@ window.explorer.tour ??= (() => {
     CLOSE = `${DRAWER} [data-dock-minimize]`;
   const FRONT = "[data-dock-strip] > [aria-selected=true]:not([data-ex=dialog] *)";
   const card = document.createElement("div");
-  Object.assign(card, { className: "ex-tour", role: "region", ariaLabel: "Tour" });
+  Object.assign(card, { className: "ex-tour", role: "region" });
   // What was in front before the tour; null without a tour.
   let before = null;
   // The step whose tab is in front, and the wanted one.
@@ -38,7 +38,7 @@ window.explorer.tour ??= (() => {
   const follow = () => {
     if (shown?.number !== wanted.number && document.querySelector(DRAWER)) turn();
     if (shown?.number !== wanted.number || ringed?.isConnected) return;
-    const control = document.querySelector(wanted.control);
+    const control = wanted.control ? document.querySelector(wanted.control) : null;
     // A slider is ringed with its words and its field.
     ring(control?.matches("[role=slider]") ? window.explorer.names.rowOf(control) : control);
   };
@@ -66,11 +66,12 @@ window.explorer.tour ??= (() => {
       return;
     }
     card.innerHTML = html;
+    card.ariaLabel = step.title;
     if (!card.isConnected) document.body.append(card);
     wanted = step;
     follow();
     watch.observe(document.body, changes);
-    ringHandle(step.number === 0);
+    ringHandle(step.ringsHandle);
   };
   return Object.assign(show, { offer, end });
 })();

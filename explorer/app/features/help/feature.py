@@ -1,4 +1,4 @@
-"""Help: the search, the theme, and the dialog with the tour, the manual and the keys."""
+"""Help: the search, the theme, and the dialog with the tour, lessons, the manual and the keys."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from html import escape
 import viser
 
 from explorer.app.features.feature import Feature, Services, Tab
+from explorer.app.features.help.guide import CourseGuide
+from explorer.app.features.help.handout import handout_html
 from explorer.app.features.help.search import TITLE, SearchDialog
-from explorer.app.features.help.tour import TourGuide
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import MANUAL, open_button, press_button
 from explorer.app.widgets.markup import box, caption, dim
@@ -17,11 +18,13 @@ from explorer.page.browser.viser_gaps import run_script_in
 from explorer.page.widgets import palette
 from explorer.page.widgets.assigning import Updates
 
-PRESS = "page"
+PRESS, LESSON, HANDOUT = "page", "lesson", "lesson.handout"
 KEYS = {"Theme": (palette.shift("L"),), "Keys": (palette.Key("K"),)}
+BEGIN = "Begin the lesson at this step."
 HINTS = {
     "Tour": "Five steps, from the first move to a better design.",
     "Keys": "Show all keys.",
+    "Handout": "Download the lesson on this design as an HTML file to print, with its pictures.",
     "Theme": "Turn the page dark or light, or have it as the system is.",
 }
 # Keys and pointers with which viser moves the camera.
@@ -33,14 +36,15 @@ class HelpButtons:
 
     def __init__(self, services: Services) -> None:
         presses: dict[str, Callable[[viser.ClientHandle], None]] = {
-            "Tour": services.get(TourGuide).begin,
+            "Tour": services.get(CourseGuide).begin,
             "Keys": lambda client: run_script_in(client, 'window.explorer.open("Help")'),
             "Theme": services.theme.turn,
         }
         buttons = services.buttons
         buttons.on(PRESS, lambda name, client: presses[name](client), values=presses)
-        for name, hint in HINTS.items():
-            buttons.offer(f"Page › {name}", hint, PRESS, name, keys=KEYS.get(name, ()))
+        for name in presses:
+            keys = KEYS.get(name, ())
+            buttons.offer(f"Page › {name}", HINTS[name], PRESS, name, keys=keys)
         commands = open_button(
             TITLE,
             f"Search {keycap(str(palette.PALETTE_KEY))}",
@@ -64,7 +68,7 @@ class HelpButtons:
 
 
 class HelpDialog:
-    """The tour, the manual, and all keys of the page."""
+    """The tour, the lessons, the manual, and all keys of the page."""
 
     def __init__(self, services: Services) -> None:
         buttons = (
@@ -73,6 +77,7 @@ class HelpDialog:
             + dim("All pages, beside the scene."),
         )
         self._rows = "".join(f'<div class="ex-row" data-closes>{each}</div>' for each in buttons)
+        self._rows += lessons_html(services)
         self._html = services.gui.add_html("")
         self._services = services
         self._markup = ""
@@ -81,6 +86,47 @@ class HelpDialog:
         """Yield the markup with the keys, which are known once all features are made."""
         self._markup = self._markup or box(self._rows + keys_table(self._services.commands.all))
         yield self._html, "content", self._markup
+
+
+def lessons_html(services: Services) -> str:
+    """Offer the lessons, their steps and their handouts in the search; return a list as HTML."""
+    guide, buttons = services.get(CourseGuide), services.buttons
+
+    def begin(value: str, client: viser.ClientHandle) -> None:
+        file, _, at = value.partition("#")
+        guide.begin(client, file, int(at))
+
+    def send(file: str, client: viser.ClientHandle) -> None:
+        lesson, state = guide.courses[file], services.session.latest_state()
+        services.downloads.make(
+            client.client_id,
+            "Drawing the handout",
+            lambda _: (f"{lesson.title}.html", handout_html(lesson, state).encode()),
+        )
+
+    def button(label: str, hint: str, press: str, value: str) -> str:
+        buttons.offer(f"Lessons{palette.STEP}{label}", hint, press, value)
+        words = escape(label.rpartition(palette.STEP)[2])
+        return press_button(press, value, words, hint=hint, class_name="ex-link")
+
+    rows, lessons = "", [each for each in guide.courses.values() if each.is_lesson]
+    for lesson in lessons:
+        label, file = f"{lesson.title}{palette.STEP}", lesson.file
+        steps = "".join(
+            f"<div>{button(f'{label}{at + 1}  {step.title}', BEGIN, LESSON, f'{file}#{at}')}</div>"
+            for at, step in enumerate(lesson.steps)
+        )
+        rows += (
+            f'<div class="ex-export"><div><b>{escape(lesson.title)}</b>'
+            f'<div class="ex-dim">{escape(lesson.sentence)}</div>'
+            f"{button(f'{label}Handout', HINTS['Handout'], HANDOUT, file)}</div>"
+            f"<div data-closes>{steps}</div></div>"
+        )
+    # Presses on what no lesson has are dropped.
+    steps = {f"{each.file}#{at}" for each in lessons for at in range(len(each.steps))}
+    buttons.on(LESSON, begin, values=steps)
+    buttons.on(HANDOUT, send, values=[each.file for each in lessons])
+    return f'<div class="ex-lessons">{caption("Lessons")}{rows}</div>'
 
 
 def keycap(key: str) -> str:
@@ -110,5 +156,5 @@ HELP = Feature(
     "help",
     tabs=(Tab("dialog", "Help", HelpDialog), Tab("dialog", TITLE, SearchDialog)),
     bar=(("right", HelpButtons),),
-    runners=(TourGuide,),
+    runners=(CourseGuide,),
 )
