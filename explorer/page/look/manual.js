@@ -11,10 +11,7 @@ window.explorer.manual ??= (() => {
     MARK = "ex-found";
   const addClose = (card) => {
     if (card.querySelector(".ex-closes")) return;
-    const button = document.createElement("button");
-    Object.assign(button, { type: "button", className: "ex-closes", textContent: "×" });
-    button.title = "Close (Escape)";
-    button.setAttribute("aria-label", "Close the manual");
+    const button = window.explorer.closeButton("Close the manual", "Close (Escape)");
     button.dataset.press = "help.close";
     card.append(button);
   };

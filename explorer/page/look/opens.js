@@ -15,14 +15,10 @@ window.explorer.opens ??= (() => {
     }
     shade.remove();
   };
-  const closeButton = () => {
+  window.explorer.closeButton = (words, title) => {
     const button = document.createElement("button");
-    button.type = "button";
-    button.className = "ex-closes";
-    button.textContent = "×";
-    button.title = "Close";
-    button.setAttribute("aria-label", "Close the dialog");
-    button.addEventListener("click", closeDialogs);
+    Object.assign(button, { type: "button", className: "ex-closes", textContent: "×", title });
+    button.ariaLabel = words;
     return button;
   };
   const openDialog = (dialog, title) => {
@@ -33,7 +29,11 @@ window.explorer.opens ??= (() => {
     dialog.setAttribute("role", "dialog");
     dialog.setAttribute("aria-label", title);
     dialog.parentElement.append(shade);
-    if (!dialog.querySelector(".ex-closes")) dialog.append(closeButton());
+    if (!dialog.querySelector(".ex-closes")) {
+      const button = window.explorer.closeButton("Close the dialog", "Close");
+      button.addEventListener("click", closeDialogs);
+      dialog.append(button);
+    }
     dialog.querySelector("[type=search], .ex-closes").focus({ preventScroll: true });
   };
   const open = (title) => {
