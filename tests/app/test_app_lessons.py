@@ -262,18 +262,21 @@ DAMAGED = {
     "# A\n# B\n## C": (2, "## TITLE"),
     "Text.\n# A\n## B": (2, "# TITLE"),
     "# A\n## B\n- tab: Pose": (2, "lacks text and asked and shown"),
-    "# A\n## B\n- tab: Poses": (3, "'Poses'; the tabs are Pose, Design"),
-    "# A\n## B\nText.\n- asks: mode = 1": (4, "'asks'; the keys are tab, control, asked"),
+    "# A\n## B\n- tab: Poses": (3, "'Poses' is not among the tabs: Pose, Design"),
+    "# A\n## B\nText.\n- asks: mode = 1": (4, "'asks' is not among the keys: text, tab"),
     "# A\n## B\n- asked: mode is 1": (3, "NAME < NUMBER"),
-    "# A\n## B\n- asked: δ4 < 2 mm": (3, "'δ4' is not among platform, design"),
+    "# A\n## B\n- asked: δ4 < 2 mm": (3, "'δ4' is not among the values: platform, design"),
     "# A\n## B\n- asked: δ1 < 2": (3, "a length such as 2 mm; got '2'"),
     "# A\n## B\n- asked: δ1 < 2 m": (3, "a length such as 2 mm; got '2 m'"),
     "# A\n## B\n- asked: amplification > many": (3, "a number; got 'many'"),
-    "# A\n## B\n- asked: mode = 8": (3, "never '8'; it is one of 0, 1, 2"),
-    "# A\n## B\n- asked: mode < 4": (3, "takes = or ≠ here, not <"),
-    "# A\n## B\n- shown: δ1 < 2 mm": (3, "takes = here, not <"),
-    "# A\n## B\n- shown: amplification = 3": (3, "'amplification' is not among"),
-    "# A\n## B\n- first: ghosts = yes": (3, "it is one of on, off"),
+    "# A\n## B\n- asked: mode = 8": (3, "'8' is not among the words of mode: 0, 1, 2"),
+    "# A\n## B\n- asked: mode < 4": (3, "'<' is not among the signs of mode: =, ≠"),
+    "# A\n## B\n- shown: δ1 < 2 mm": (3, "'<' is not among the signs of δ1: ="),
+    "# A\n## B\n- shown: amplification = 3": (
+        3,
+        "'amplification' is not among what can be set: platform",
+    ),
+    "# A\n## B\n- first: ghosts = yes": (3, "'yes' is not among the words of ghosts: on, off"),
 }
 
 
@@ -358,6 +361,11 @@ def test_next_in_a_wrong_state_does_nothing_and_skip_goes_on() -> None:
     # What was done stays done only as long as it is so.
     desk.do(set_mode(4), ONE)
     assert not desk.card.is_done
+    desk.tour("Skip")
+    desk.tour("Skip")
+    # Nor does a press that comes late end the lesson.
+    desk.tour("Next")
+    assert desk.card.is_last
 
 
 def test_reading_has_the_unit_of_the_page() -> None:

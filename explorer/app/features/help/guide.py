@@ -255,15 +255,15 @@ class CourseGuide(Runner):
         card = self.cards.get(client.client_id)
         if name == OFFER and not self._session.state.busy:
             self.begin(client)
-        if card is None:
+        # The state may have changed while a press was on its way.
+        if card is None or (name == "Next" and card.is_waiting):
             return
         is_on = name in ("Next", "Skip")
         if name == "Show me":
             self._set(card, card.step.shown)
         elif name == "Leave" or (is_on and card.is_last):
             self._end(client.client_id)
-        # The state may have changed while a press was on its way.
-        elif name != "Next" or not card.is_waiting:
+        else:
             self._set(card, card.step.then if is_on else ())
             with self._lock:
                 card.turn(1 if is_on else -1, Frame(self._session.state))

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import operator
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -127,20 +128,17 @@ class Step:
 
 @dataclass(frozen=True)
 class Course:
-    """The tour or a lesson: the name of its file, a title, a sentence, and its steps."""
+    """The tour or a lesson: the name of its file, a title, a sentence, and its steps.
+
+    A step of a lesson is done only while the state has what it asks for, and one does it or skips
+    it; one of the tour stays done, and one may go on before.
+    """
 
     file: str
     title: str
     sentence: str
     steps: tuple[Step, ...]
-
-    @property
-    def is_lesson(self) -> bool:
-        """Whether a step is done only while the state has what it asks for.
-
-        A step of the tour stays done, and one may go on before.
-        """
-        return self.file != TOUR
+    is_lesson: bool
 
 
 def list_courses() -> dict[str, Course]:
@@ -165,7 +163,7 @@ def parse_course(file: str, text: str) -> Course:
         raise InputError(f"lesson {file}, line {line}: {words}")
     title, *words = lines[: heads[1]]
     steps = (_step(file, lines, *ends) for ends in pairwise((*heads[1:], len(lines))))
-    return Course(file, title[2:], " ".join(words).strip(), tuple(steps))
+    return Course(file, title[2:], " ".join(words).strip(), tuple(steps), file != TOUR)
 
 
 def _step(file: str, lines: list[str], start: int, end: int) -> Step:
@@ -194,27 +192,29 @@ def _step(file: str, lines: list[str], start: int, end: int) -> Step:
 
 def _parse(key: str, value: str) -> str | Relation:
     """Return the value of a key; an InputError says what is allowed."""
-    if key not in ("text", *KEYS):
-        raise InputError(f"there is no key {key!r}; the keys are {', '.join(KEYS)}")
-    if key == "tab" and value not in TABS:
-        raise InputError(f"there is no tab {value!r}; the tabs are {', '.join(TABS)}")
+    _check("the keys", key, ("text", *KEYS))
+    if key == "tab":
+        _check("the tabs", value, TABS)
     if key not in RELATIONS:
         return value
     found = RELATION.fullmatch(value)
     if found is None:
         raise InputError(f"{value!r} is not NAME < NUMBER, NAME > NUMBER or NAME = VALUE")
     (name, sign, bound), is_setting = found.groups(), key != "asked"
-    known = [each for each, of in VALUES.items() if of.set or not is_setting]
-    if name not in known:
-        raise InputError(f"{name!r} is not among {', '.join(known)}")
+    what = "what can be set" if is_setting else "the values"
+    _check(what, name, [each for each, of in VALUES.items() if of.set or not is_setting])
     options, is_length = VALUES[name].options, VALUES[name].is_length
-    signs = "=" if is_setting else "=≠" if options else "<>="
-    if sign not in signs:
-        raise InputError(f"{name!r} takes {' or '.join(signs)} here, not {sign}")
-    if options and bound not in options:
-        raise InputError(f"{name!r} is never {bound!r}; it is one of {', '.join(options)}")
+    _check(f"the signs of {name}", sign, "=" if is_setting else "=≠" if options else "<>=")
+    if options:
+        _check(f"the words of {name}", bound, options)
+        return Relation(name, sign, bound)
     number = (LENGTH if is_length else NUMBER).fullmatch(bound)
-    if not options and number is None:
+    if number is None:
         takes = "a length such as 2 mm" if is_length else "a number"
         raise InputError(f"{name!r} takes {takes}; got {bound!r}")
-    return Relation(name, sign, float(number[1]) if number and not options else bound)
+    return Relation(name, sign, float(number[1]))
+
+
+def _check(what: str, value: str, allowed: Sequence[str]) -> None:
+    if value not in allowed:
+        raise InputError(f"{value!r} is not among {what}: {', '.join(allowed)}")

@@ -71,12 +71,6 @@ def _event(
     )
 
 
-def _has_ended(now: State, start: State) -> bool:
-    """Whether a search that began after a state has ended."""
-    of = Optimisation.of(now)
-    return of.count > Optimisation.of(start).count and not of.is_on
-
-
 def _sizes(frame: Frame) -> list[float]:
     """Return |δ1|, |δ2| and |δ3|, in mm."""
     return (frame.state.design.unit_mm * np.abs(frame.snapshot.margins)).tolist()
@@ -86,10 +80,11 @@ def _flattest(frame: Frame) -> int:
     return int(np.argmin(_sizes(frame)))
 
 
-def _margin(index: int) -> Named:
+def _margin(which: Callable[[Frame], int]) -> Named:
+    """Return the margin with the index that a function of the frame returns."""
     return Named(
-        lambda now, _: _sizes(now)[index],
-        lambda state, size: _flatten(state, index, size),
+        lambda now, _: _sizes(now)[which(now)],
+        lambda state, size: _flatten(state, which(Frame(state)), size),
         is_length=True,
     )
 
@@ -168,19 +163,24 @@ VALUES: dict[str, Named] = {
         "changed",
         lambda state: set_variable("a3x", GROWTH * state.design.variables[0]).apply(state),
     ),
-    "search": _event(_has_ended, "ended", start_run().apply),
+    "search": _event(
+        lambda now, start: (
+            Optimisation.of(now).count > Optimisation.of(start).count
+            and not Optimisation.of(now).is_on
+        ),
+        "ended",
+        start_run().apply,
+    ),
     "problem": _event(lambda _, __: False, "that of the paper", take_paper_problem().apply),
     "solid": _choice("view.workspace.solid", {"on": True, "off": False}),
     "tetrahedra": _choice("view.tetrahedra", {"on": (True,) * 3, "off": (False,) * 3}),
     "ghosts": _choice("view.ghosts", {"on": True, "off": False}),
     "sliders": _choice("view.coordinates", {"Pose": "position", "Leg lengths": "lengths"}),
     "weights": _choice("view.forces.weighed", {"none": "none", "payload": "payload"}),
-    **{f"δ{index + 1}": _margin(index) for index in range(3)},
-    "smallest margin": Named(
-        lambda now, _: min(_sizes(now)),
-        lambda state, size: _flatten(state, _flattest(Frame(state)), size),
-        is_length=True,
-    ),
+    "δ1": _margin(lambda _: 0),
+    "δ2": _margin(lambda _: 1),
+    "δ3": _margin(lambda _: 2),
+    "smallest margin": _margin(_flattest),
     "flattest tetrahedron": Named(lambda now, _: FLAT[_flattest(now)], _make_flattest, FLAT),
     "verdict": Named(lambda now, _: now.verdict.title, _to_verdict, (*TITLES.values(),)),
     "amplification": Named(_amplification),
