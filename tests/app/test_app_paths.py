@@ -23,7 +23,7 @@ from desk import Desk, controls_of
 from services import StubDownloads, StubJobs, services_for
 
 from explorer.app.features.feature import Services
-from explorer.app.features.loads.load import weights_of_parts
+from explorer.app.features.loads.load import Loads, weights_of_parts
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.paths.actions import (
     DrivesRequest,
@@ -47,9 +47,9 @@ from explorer.app.features.paths.panel import (
 )
 from explorer.app.features.paths.plots import (
     PLACE,
-    LoadsAlong,
     crossing_time,
     crossing_words,
+    loads_along,
     margins_html,
     margins_over,
 )
@@ -688,13 +688,11 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces() -> None:
 def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     state = straight(Set("view.at", "tool"))
     journey = path_of(state)
-    found = LoadsAlong(services).shares(Frame(state))
+    found = loads_along(journey, services.get(Loads).of(Frame(state)))
     assert found is not None
     expected = path_loads(PRESS, journey.poses, state.load, tool=journey.tool)
-    np.testing.assert_array_equal(found.path.utilisations, expected.utilisations)
-    timed = journey.trajectory
-    np.testing.assert_allclose(np.interp(found.time, timed.time, timed.at), expected.at, atol=1e-9)
-    pose = journey.pose_at(found.seconds)
+    np.testing.assert_array_equal(found.utilisations, expected.utilisations)
+    pose = journey.pose_at(journey.time_at(found.place))
     here = path_loads(PRESS, (pose, pose), state.load)
     assert (here.utilisation, here.part) == (pytest.approx(expected.utilisation), expected.part)
 

@@ -23,7 +23,7 @@ from explorer.app.features.singularity import work
 from explorer.app.features.singularity.feature import (
     GOALS,
     SingularityPanel,
-    StrataPanel,
+    add_strata,
     distance_table,
     distances_of,
     performance_table,
@@ -40,6 +40,7 @@ from explorer.app.features.singularity.scene import (
     NearestGhost,
     show_button,
 )
+from explorer.app.inputs.controls import Controls
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set
@@ -112,7 +113,8 @@ def test_stratum_without_a_nearest_pose_is_refused(lower: tuple[int, ...]) -> No
 def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
     services: Services, desk: Desk, jobs: StubJobs
 ) -> None:
-    panel = StrataPanel(services)
+    panel = Controls(services)
+    add_strata(services, panel)
 
     def contents() -> list[str]:
         updates = panel.updates(Frame(desk.state))

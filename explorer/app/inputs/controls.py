@@ -44,7 +44,7 @@ class WithControls(WithCommands, Protocol):
 
 
 class Controls:
-    """Makes controls and keeps them in step with the state.
+    """Makes controls and keeps them in step with the state, as a panel or a part of one.
 
     Most controls name the path of a plain value of the state, such as "view.singular.ball", from
     which reading, writing and the words of the history follow; `At` says more of it. A
@@ -59,6 +59,18 @@ class Controls:
         self._controls: list[Control[Any]] = []
         # Folders and controls with the words that name them, and the power of length of their unit.
         self._labels: list[tuple[Any, str, int]] = []
+        self._markups: list[tuple[viser.GuiHtmlHandle, Callable[[Frame], str]]] = []
+        self._followers: list[tuple[Any, str, Callable[[Frame], object]]] = []
+
+    def markup(self, content: Callable[[Frame], str]) -> viser.GuiHtmlHandle:
+        """Add HTML that follows the frame, hidden while there is none."""
+        handle = self._gui.add_html("", visible=False)
+        self._markups.append((handle, content))
+        return handle
+
+    def follow(self, handle: Any, name: str, value: Callable[[Frame], object]) -> None:
+        """Have a property of a handle follow the frame, such as "visible"."""
+        self._followers.append((handle, name, value))
 
     def folder(self, title: str, *, is_open: bool = True) -> viser.GuiFolderHandle:
         """Add a folder, in whose title "{unit}" stands for the unit of lengths."""
@@ -261,6 +273,13 @@ class Controls:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make every control show the frame."""
+        for handle, content_of in self._markups:
+            content = content_of(frame)
+            yield handle, "visible", content != ""
+            if content:
+                yield handle, "content", content
+        for handle, name, value in self._followers:
+            yield handle, name, value(frame)
         for handle, words, power in self._labels:
             yield handle, "label", words.format(unit=frame.state.unit_of(power).name)
         for control in self._controls:

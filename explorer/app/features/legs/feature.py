@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from explorer.app.features.feature import Feature, Services, Tab, show, show_html
+from explorer.app.features.feature import Feature, Services, Tab, show
 from explorer.app.inputs.controls import Controls
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import (
@@ -31,36 +31,26 @@ from explorer.mechanism.rgb import OUTLINE
 from explorer.page.widgets.assigning import Updates
 
 
-class ClearancePanel:
+class ClearancePanel(Controls):
     """The table of clearances, and that of the last move."""
 
     def __init__(self, services: Services) -> None:
-        gui = services.gui
-        self._copy = services.copy_button(
+        super().__init__(services)
+        copy = services.copy_button(
             "Workspace › Clearance",
             lambda state: pose_command("interference", state.design, state.pose),
         )
-        self._controls = controls = Controls(services)
-        with gui.add_folder("Clearance"):
-            self._pose = gui.add_html("")
-            controls.checkbox(
+        with services.gui.add_folder("Clearance"):
+            self.markup(
+                lambda frame: render(pose_clearances(frame.snapshot, frame.state.unit), corner=copy)
+            )
+            self.checkbox(
                 "Swept tetrahedra",
                 "Draw the tetrahedra that the legs swept in the last move, and compare the paper's "
                 "test for interference with the exact one.",
                 "view.swept",
             )
-            self._move = gui.add_html("", visible=False)
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
-        view = frame.state.view
-        yield (
-            self._pose,
-            "content",
-            render(pose_clearances(frame.snapshot, frame.state.unit), corner=self._copy),
-        )
-        yield from self._controls.updates(frame)
-        yield from show_html(self._move, move_table(frame) if view.swept else "")
+            self.markup(lambda frame: move_table(frame) if frame.state.view.swept else "")
 
 
 def move_table(frame: Frame) -> str:

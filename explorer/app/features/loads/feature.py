@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import viser
 
-from explorer.app.features.feature import BarPart, Feature, Services, Tab, show_html
+from explorer.app.features.feature import BarPart, Feature, Services, Tab
 from explorer.app.features.loads import load, precision
 from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEllipsoidScene
 from explorer.app.features.loads.scene import ForcesScene, LoadHandle
@@ -31,7 +31,6 @@ from explorer.app.widgets.under_way import problem
 from explorer.measures.blocks import forces
 from explorer.measures.blocks.block import Share, Statement
 from explorer.mechanism.machine import Guide
-from explorer.page.widgets.assigning import Updates
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, has_limits
 
@@ -42,17 +41,16 @@ LIMITS = (f"actuators {FORCE:g} N", f"struts {MOMENT:g} N m", f"guide {FORCE:g} 
 """Words for the typical limits."""
 
 
-class ForcesPanel:
+class ForcesPanel(Controls):
     """The verdict on the load, its controls, and tables of what holds it."""
 
     def __init__(self, services: Services) -> None:
-        gui = services.gui
+        super().__init__(services)
         self._loads = services.get(load.Loads)
         self._nearest = services.get(load.nearest_feed)
-        self._controls = controls = Controls(services)
-        self._top = gui.add_html("")
-        with gui.add_folder("Load at the tool (axes of the base)"):
-            controls.triple(
+        self.markup(self._summary)
+        with services.gui.add_folder("Load at the tool (axes of the base)"):
+            self.triple(
                 "Force (N)",
                 "Force on the platform at the tool point, along x, y and z of the base; its arrow "
                 "in the scene can be dragged.",
@@ -62,13 +60,13 @@ class ForcesPanel:
                 ),
                 step=0.1,
             )
-            controls.triple(
+            self.triple(
                 "Moment (N m)",
                 "Moment on the platform, about x, y and z of the base.",
                 "view.forces.moment",
                 step=0.01,
             )
-            controls.dropdown(
+            self.dropdown(
                 "Weights",
                 "The bodies whose weights act besides: none, the payload of the tab Machine, or "
                 "also the platform and the legs, as parts of the prototype.",
@@ -76,7 +74,7 @@ class ForcesPanel:
                 "view.forces.weighed",
                 is_in_palette=True,
             )
-            controls.checkbox(
+            self.checkbox(
                 "Forces in the scene",
                 "Draw the load, the forces of the legs on the platform, the forces along the "
                 "guide, and the bending of the struts, in colours of their shares.",
@@ -91,8 +89,8 @@ class ForcesPanel:
                 assume_limits,
             ),
         )
-        self._tables = gui.add_html("")
-        self._most = gui.add_html("")
+        self.markup(self._tables)
+        self.markup(self._largest_loads)
         self._copy = services.copy_button(
             "Loads › Forces", lambda state: self._loads.command("forces", state)
         )
@@ -116,20 +114,18 @@ class ForcesPanel:
             ),
         )
 
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
+    def _summary(self, frame: Frame) -> str:
         loaded = self._loads.of(frame)
-        is_bare = load.is_bare(loaded)
-        verdict = NO_LOAD if is_bare else forces.verdict(loaded)
+        verdict = NO_LOAD if load.is_bare(loaded) else forces.verdict(loaded)
         summary = (verdict, *self._nearest_position(frame, loaded))
-        top = render(summary, {"go": self._go}, corner=self._copy) + self._notes(frame)
-        yield self._top, "content", top
-        tables = "" if is_bare else render(forces.reaction_tables(loaded))
-        yield from show_html(self._tables, tables)
-        yield self._most, "content", self._largest_loads(frame, loaded)
-        yield from self._controls.updates(frame)
+        return render(summary, {"go": self._go}, corner=self._copy) + self._notes(frame)
 
-    def _largest_loads(self, frame: Frame, loaded: LoadedPose) -> str:
+    def _tables(self, frame: Frame) -> str:
+        loaded = self._loads.of(frame)
+        return "" if load.is_bare(loaded) else render(forces.reaction_tables(loaded))
+
+    def _largest_loads(self, frame: Frame) -> str:
+        loaded = self._loads.of(frame)
         most, size = forces.largest_loads(loaded), math.hypot(*frame.state.view.forces.force)
         if size > 0.0:
             facts = forces.worst_force(without_force(loaded).worst_force(size), "this force")

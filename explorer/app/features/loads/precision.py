@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 
-from explorer.app.features.feature import FileExport, Services, html_of, show_html
+from explorer.app.features.feature import FileExport, Services, html_of
 from explorer.app.features.loads import load as tasks
 from explorer.app.features.loads.load import Loads
 from explorer.app.inputs.bindings import At
@@ -21,7 +21,6 @@ from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks import precision as answers
 from explorer.measures.box import PositionSet
 from explorer.mechanism.design_file import typical_machine
-from explorer.page.widgets.assigning import Updates
 from explorer.statics.budget import with_tolerances
 from explorer.statics.compliance import is_elastic
 
@@ -66,28 +65,30 @@ def _is_wanted(state: State) -> bool:
     return state.view.precision.budget and state.view.precision.wanted is not None
 
 
-class PrecisionPanel:
+class PrecisionPanel(Controls):
     """Errors of the tool, its deflection, what is drawn of them, and the budget of tolerances."""
 
     def __init__(self, services: Services) -> None:
+        super().__init__(services)
         gui, self._loads = services.gui, services.get(Loads)
         self._feed = services.get(BUDGET_FEED)
-        self._controls = controls = Controls(services)
         with gui.add_folder("Precision"):
-            self._top = gui.add_html("")
-            controls.checkbox(
+            self.markup(self._errors)
+            self.checkbox(
                 "Error ellipsoid in the scene",
                 "Draw the ellipsoid of the tool's RMS displacement, for errors uniform within "
                 "their bounds, magnified as its label says.",
                 "view.precision.ellipsoid",
             )
-            self._deflection = gui.add_html("")
-            controls.checkbox(
+            self.markup(
+                lambda frame: render(answers.deflections(self._loads.precision(frame), LOAD))
+            )
+            self.checkbox(
                 "Deflected shape in the scene",
                 "Draw platform and legs as the load deflects them, magnified.",
                 "view.precision.deflected",
             )
-            controls.number(
+            self.number(
                 "Magnification (0: automatic)",
                 "How many times larger the deflection is drawn than it is.",
                 _zero_for_none("view.precision.times"),
@@ -96,16 +97,14 @@ class PrecisionPanel:
                 visible=lambda state: state.view.precision.deflected,
             )
         with gui.add_folder("Budget of tolerances"):
-            controls.checkbox(
+            self.checkbox(
                 "What each tolerance costs",
                 "Rank the six actuators and the 25 dimensions by what their errors cost at the "
                 "tool.",
                 "view.precision.budget",
             )
-            controls.dropdown(
-                "Worst over", OVER_HINT, OVER, "view.precision.over", is_in_palette=True
-            )
-            controls.number(
+            self.dropdown("Worst over", OVER_HINT, OVER, "view.precision.over", is_in_palette=True)
+            self.number(
                 "Wanted within ± (mm)",
                 "Largest displacement of the tool that is wanted: tolerances of the least total "
                 "effort that keep it are found. 0 ranks the tolerances as they are.",
@@ -114,7 +113,7 @@ class PrecisionPanel:
                 step=0.01,
                 visible=lambda state: state.view.precision.budget,
             )
-            controls.number(
+            self.number(
                 "and turned within ± (°)",
                 "Largest turn of the tool that is wanted besides; 0 is any.",
                 _zero_for_none("view.precision.wanted_turn"),
@@ -122,14 +121,14 @@ class PrecisionPanel:
                 step=0.01,
                 visible=_is_wanted,
             )
-            controls.checkbox(
+            self.checkbox(
                 "Keep the actuators' errors",
                 "Find tolerances of the dimensions alone, with the errors of the actuators as they "
                 "are; off, errors of the actuators are found too.",
                 "view.precision.keep_actuators",
                 visible=_is_wanted,
             )
-            self._result = gui.add_html("", visible=False)
+            self.markup(self._budget_html)
         self._set = services.link(
             "precision.set",
             StateCommand(
@@ -151,18 +150,19 @@ class PrecisionPanel:
             ),
         )
 
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
+    def _errors(self, frame: Frame) -> str:
         precision = self._loads.precision(frame)
-        design = precision.loaded.design
-        errors = render(answers.tool_errors(precision), corner=self._copy)
-        if not (precision.has_errors and is_elastic(design)):
-            errors += offer("errors and stiffness", _typical(design)[1], self._assume)
-        yield self._top, "content", errors
-        yield self._deflection, "content", render(answers.deflections(precision, LOAD))
-        yield from self._controls.updates(frame)
-        budget = html_of(self._feed, self._budget, "There is no budget")
-        yield from show_html(self._result, "" if self._feed.request is None else budget)
+        design, errors = (
+            precision.loaded.design,
+            render(answers.tool_errors(precision), corner=self._copy),
+        )
+        if precision.has_errors and is_elastic(design):
+            return errors
+        return errors + offer("errors and stiffness", _typical(design)[1], self._assume)
+
+    def _budget_html(self, _: Frame) -> str:
+        is_shown = self._feed.request is not None
+        return html_of(self._feed, self._budget, "There is no budget") if is_shown else ""
 
     def _budget(self, drawing: tasks.BudgetDrawing) -> str:
         request, costs, found = drawing.request, drawing.costs, drawing.found

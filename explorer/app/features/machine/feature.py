@@ -8,7 +8,7 @@ from dataclasses import replace
 import msgspec
 import viser
 
-from explorer.app.features.feature import Feature, Services, Tab, show_html
+from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls, add_actuators
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.inputs.bindings import At, ControlBinding, item
@@ -29,7 +29,6 @@ from explorer.mechanism.machine import (
 )
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.number_text import format_number
-from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import NO_OPTION
 
 # Limits that are switched on begin with these: N m and MPa; the tube in mm.
@@ -67,41 +66,41 @@ def set_tool_angle(state: State, axis: int, value: float) -> State:
     return replace(changed, set_tool_angles=angles)
 
 
-class MachinePanel:
+class MachinePanel(MachineControls):
     """The controls for the machine around the mechanism."""
 
     def __init__(self, services: Services) -> None:
+        super().__init__(services)
         gui = services.gui
-        self._controls = controls = MachineControls(services)
         # Moments of inertia that are being typed, and the payload that cannot have them.
         self._typed: tuple[Payload, Triple] | None = None
-        with controls.folder("Tool on the platform ({unit}, degrees)"):
+        with self.folder("Tool on the platform ({unit}, degrees)"):
             self._add_point("tool", "the tool point", "design.tool.position")
             for axis, (name, about, edge) in enumerate(ANGLES):
-                controls.slider(
+                self.slider(
                     f"tool {name} (°)",
                     f"Rotation of the tool on the platform {about}, in degrees.",
                     item(lambda frame: frame.state.tool_angles, axis, set_tool_angle),
                     Span(-edge, edge, 0.1),
                 )
-        with controls.folder("Payload ({unit}, kg, N)"):
-            controls.field(
+        with self.folder("Payload ({unit}, kg, N)"):
+            self.field(
                 "Mass (kg)",
                 "Mass that the platform carries.",
                 "design.payload.mass_kg",
                 step=FINE,
             )
-            self._weight = gui.add_html("", visible=False)
+            self.markup(weight_words)
             self._add_point("centre", "the payload's centre", "design.payload.centre")
-            controls.triple(
+            self.triple(
                 "Inertia (kg mm²)",
                 "Moments of inertia about the payload's centre along the platform's axes; they "
                 "count in motions only.",
                 ControlBinding(lambda frame: self._inertia(frame.state), self._set_inertia),
                 step=FINE,
             )
-            self._no_body = gui.add_html("", visible=False)
-            controls.field(
+            self.markup(self._inertia_words)
+            self.field(
                 "Force on the tool (N)",
                 "Largest force of the process, which acts at the tool point in any direction.",
                 "design.payload.force_n",
@@ -109,32 +108,23 @@ class MachinePanel:
         with gui.add_folder("Gravity", expand_by_default=False):
             self._add_gravity()
         with gui.add_folder("Actuators", expand_by_default=False):
-            add_actuators(gui, controls)
+            add_actuators(gui, self)
         with gui.add_folder("Struts of legs 2 and 3", expand_by_default=False):
             self._add_struts()
-            self._moment = gui.add_html("")
+            self.markup(lambda frame: note(moment_words(frame.state.design.struts)))
         with gui.add_folder("Guide", expand_by_default=False):
             self._add_guide()
         with gui.add_folder("Tolerances", expand_by_default=False):
             self._add_tolerances()
-        controls.button(
+        self.button(
             "Ideal machine",
             "Take tool, payload, actuators, struts, guide, tolerances and radii of the legs away.",
             clear_machine,
         )
 
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
-        state = frame.state
-        design = state.design
-        weight = design.payload.weight_n
-        words = note(f"Its weight is {format_number(weight)} N.") if weight > 0.0 else ""
-        yield from show_html(self._weight, words)
-        problem = inertia_problem(design.payload.mass_kg, self._inertia(state))
-        words = note(f"Not taken yet: the inertia {problem}.") if problem else ""
-        yield from show_html(self._no_body, words)
-        yield self._moment, "content", note(moment_words(design.struts))
-        yield from self._controls.updates(frame)
+    def _inertia_words(self, frame: Frame) -> str:
+        problem = inertia_problem(frame.state.design.payload.mass_kg, self._inertia(frame.state))
+        return note(f"Not taken yet: the inertia {problem}.") if problem else ""
 
     def _inertia(self, state: State) -> Triple:
         """Return the moments of inertia, or those typed so far for this payload."""
@@ -152,7 +142,7 @@ class MachinePanel:
 
     def _add_point(self, name: str, point: str, path: str) -> None:
         for axis, letter in enumerate("xyz"):
-            self._controls.slider(
+            self.slider(
                 f"{name} {letter}",
                 f"The {letter} coordinate of {point} in the platform frame, from b4.",
                 f"{path}.{axis}",
@@ -161,7 +151,7 @@ class MachinePanel:
             )
 
     def _add_gravity(self) -> None:
-        self._controls.dropdown(
+        self.dropdown(
             "Gravity",
             "Direction of gravity along an axis of the base, for a machine on a wall or overhead.",
             (*DIRECTIONS, NO_OPTION),
@@ -173,7 +163,7 @@ class MachinePanel:
             ),
             is_in_palette=True,
         )
-        self._controls.triple(
+        self.triple(
             "Direction",
             "Any other direction of gravity along the axes of the base; its length is kept at 1.",
             ControlBinding(
@@ -184,7 +174,7 @@ class MachinePanel:
         )
 
     def _add_struts(self) -> None:
-        self._controls.checkbox(
+        self.checkbox(
             "Tubes",
             "Give the struts the size of a tube; off, they are rigid.",
             ControlBinding(lambda frame: _is_tube(frame.state), _make_tubes),
@@ -195,8 +185,8 @@ class MachinePanel:
             ("Young's modulus (GPa)", "Aluminium 70, steel 210, carbon 130.", "modulus_gpa"),
         ):
             size = At(f"design.struts.{name}", default=lambda _: OUTER)
-            self._controls.field(label, hint, size, visible=_is_tube)
-        self._controls.limit(
+            self.field(label, hint, size, visible=_is_tube)
+        self.limit(
             "Limited stress",
             "Limit the bending stress of the tube, and with it the moment.",
             ("Largest stress (MPa)", "Largest bending stress of the tube."),
@@ -204,7 +194,7 @@ class MachinePanel:
             lambda _: STRESS,
             is_possible=_is_tube,
         )
-        self._controls.limit(
+        self.limit(
             "Moment given directly",
             "Give the largest bending moment itself, in place of that of tube and stress.",
             ("Largest moment (N m)", "Largest bending moment of a strut."),
@@ -213,14 +203,14 @@ class MachinePanel:
         )
 
     def _add_guide(self) -> None:
-        self._controls.limit(
+        self.limit(
             "Limited guide force",
             "Limit the force across the guide on each of its two carriages.",
             ("Largest force (N)", "Largest force across the guide on a carriage."),
             "design.guide.force_n",
             lambda _: FORCE,
         )
-        self._controls.limit(
+        self.limit(
             "Limited guide moment",
             "Limit the moment on the guide at each of its two carriages.",
             ("Largest moment on it (N m)", "Largest moment on the guide at a carriage."),
@@ -230,13 +220,13 @@ class MachinePanel:
 
     def _add_tolerances(self) -> None:
         """Add one number for all lengths, one for both tilts, and each by itself."""
-        self._controls.field(
+        self.field(
             EVERY_LENGTH,
             "Tolerance of all 21 lengths below; the field shows the largest of them.",
             ControlBinding(_largest_length, _set_lengths),
             step=FINE,
         )
-        self._controls.field(
+        self.field(
             BOTH_TILTS,
             "Tolerance of both tilts of the guide through a1; the field shows the larger one.",
             ControlBinding(
@@ -246,7 +236,7 @@ class MachinePanel:
             step=FINE,
         )
         for name, body in LENGTHS.items():
-            self._controls.triple(
+            self.triple(
                 f"{name} (± mm)",
                 f"Tolerance of {name}, along the axes of the {body}.",
                 f"design.tolerances.{name}",
@@ -255,7 +245,7 @@ class MachinePanel:
         for index, axis in enumerate("yz"):
             hint = f"Tolerance of the guide's turn about {axis} through a1."
             label = f"guide tilt {axis} (± °)"
-            self._controls.field(label, hint, f"{TILTS}.{index}", step=FINE)
+            self.field(label, hint, f"{TILTS}.{index}", step=FINE)
 
 
 DIRECTIONS: dict[str, Triple] = {
@@ -277,6 +267,12 @@ def direction_name(gravity: Triple) -> str | None:
     distances = {name: math.dist(gravity, along) for name, along in DIRECTIONS.items()}
     nearest = min(distances, key=distances.__getitem__)
     return nearest if distances[nearest] <= SAME_DIRECTION else None
+
+
+def weight_words(frame: Frame) -> str:
+    """Return the weight of the payload as HTML; "" without one."""
+    weight = frame.state.design.payload.weight_n
+    return note(f"Its weight is {format_number(weight)} N.") if weight > 0.0 else ""
 
 
 def moment_words(struts: Struts) -> str:

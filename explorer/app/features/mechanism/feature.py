@@ -9,7 +9,7 @@ from typing import get_args
 import viser
 
 from explorer.app.features.designs.feature import DesignName
-from explorer.app.features.feature import Feature, Services, Tab, show_html
+from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs, TwinLegs
 from explorer.app.features.mechanism.folds import Leaves, add_fold_sliders
 from explorer.app.features.mechanism.incidences import Gaps, Tetrahedra
@@ -32,7 +32,6 @@ from explorer.app.widgets.markup import alert, box, group, note, remark
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.page.look import read_file
-from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import NO_OPTION, Key, shift
 from explorer.workspace.limits.table import LIMITS, Limit, LimitSlider, Switch
 
@@ -75,20 +74,21 @@ VARIABLE_HINTS = {
 HOLDS: dict[str, Hold] = {"hold the pose": "pose", "hold the legs": "legs"}
 
 
-class MovePanel:
+class MovePanel(Controls):
     """Six sliders for the pose, the lengths or the folds, messages on lengths, and the modes."""
 
     def __init__(self, services: Services) -> None:
+        super().__init__(services)
         gui = services.gui
-        self._controls = controls = Controls(services)
         self._coordinates = _choice(services, "Set by", "view.coordinates", COORDINATES)
         self._points = _choice(services, "Position of", "view.at", POINTS)
-        self._switch = gui.add_html("")
-        self._sliders = gui.add_folder("")
-        with self._sliders:
+        self.markup(self._switch)
+        sliders = gui.add_folder("")
+        self.follow(sliders, "label", _sliders_title)
+        with sliders:
             position = gui.add_html(group("position", "xyz"))
             for axis, name in enumerate("xyz"):
-                controls.slider(
+                self.slider(
                     name,
                     f"The {name} coordinate of b4 or of the tool point in the base frame.",
                     item(lambda frame: frame.state.position, axis, moves.set_position),
@@ -97,9 +97,10 @@ class MovePanel:
                     visible=_is_by_position,
                 )
             angles = gui.add_html(group("angles", [name for name, _, _ in ANGLES]))
-            self._groups = position, angles
+            for mark in (position, angles):
+                self.follow(mark, "visible", lambda frame: _is_by_position(frame.state))
             for axis, (name, order, edge) in enumerate(ANGLES):
-                controls.slider(
+                self.slider(
                     f"{name} (°)",
                     f"Rotation of the platform {order}, in degrees.",
                     item(lambda frame: frame.state.yaw_pitch_roll, axis, moves.set_angle),
@@ -107,7 +108,7 @@ class MovePanel:
                     visible=_is_by_position,
                 )
             for joint, (label, hint) in enumerate(JOINT_HINTS.items()):
-                controls.slider(
+                self.slider(
                     label,
                     hint,
                     item(lambda frame: frame.state.joints, joint, moves.set_joint),
@@ -117,9 +118,9 @@ class MovePanel:
                     power=1,
                     visible=_is_by_lengths,
                 )
-            add_fold_sliders(controls)
-            self._message = gui.add_html("")
-            self._nearest = controls.button(
+            add_fold_sliders(self)
+            self.markup(lambda frame: message(frame.state) if _is_told(frame.state) else "")
+            nearest = self.button(
                 "Use the nearest length",
                 "Move this leg to the nearest length that closes and stays clear of "
                 "singularities; the other legs stay as they are.",
@@ -128,33 +129,36 @@ class MovePanel:
                 main=True,
                 keys=(Key("U"),),
             )
-            controls.button(
+            self.follow(nearest, "visible", lambda frame: _is_told(frame.state))
+            self.follow(nearest, "disabled", lambda frame: not _can_close(frame.state))
+            self.button(
                 "Home pose",
                 "Return to the home pose, with which the design opens.",
                 moves.go_home,
                 icon=viser.Icon.HOME,
                 keys=(Key("H"),),
             )
-        self._modes = ModesPanel(services)
 
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
-        state, unclosed = frame.state, frame.state.unclosed
-        sliders = COORDINATES[state.view.coordinates][0]
-        units = state.unit.name if _is_by_lengths(state) else f"{state.unit.name}, degrees"
+    def _switch(self, frame: Frame) -> str:
+        state = frame.state
         buttons, points = self._coordinates.buttons(state), box(self._points.html(state))
         switch = f'<div class="ex-segments" role="toolbar" aria-label="Set by">{buttons}</div>'
-        yield self._switch, "content", switch + points * _is_by_position(state)
-        yield self._sliders, "label", f"{sliders} ({units})"
-        for group_mark in self._groups:
-            yield group_mark, "visible", _is_by_position(state)
-        # What is wrong with a length is told whatever the sliders are.
-        is_told = _is_by_lengths(state) or unclosed is not None or state.remark is not None
-        yield from show_html(self._message, message(state) if is_told else "")
-        yield self._nearest, "visible", is_told
-        yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
-        yield from self._controls.updates(frame)
-        yield from self._modes.updates(frame)
+        return switch + points * _is_by_position(state)
+
+
+def _sliders_title(frame: Frame) -> str:
+    state = frame.state
+    units = state.unit.name if _is_by_lengths(state) else f"{state.unit.name}, degrees"
+    return f"{COORDINATES[state.view.coordinates][0]} ({units})"
+
+
+def _is_told(state: State) -> bool:
+    """Whether lengths are told of: what is wrong with one is, whatever the sliders are."""
+    return _is_by_lengths(state) or state.unclosed is not None or state.remark is not None
+
+
+def _can_close(state: State) -> bool:
+    return state.unclosed is not None and state.unclosed.nearest is not None
 
 
 def closing_values(frame: Frame, joint: int) -> Intervals:
@@ -199,14 +203,14 @@ def message(state: State) -> str:
     return f'<div class="ex-message">{text}</div>'
 
 
-class DesignPanel:
+class DesignPanel(Controls):
     """The controls for all values of a design file."""
 
     def __init__(self, services: Services) -> None:
+        super().__init__(services)
         gui = services.gui
-        self._controls = controls = Controls(services)
         with gui.add_folder("Design"):
-            controls.dropdown(
+            self.dropdown(
                 "Preset",
                 "Open one of the designs of the paper's Table 1, in its home pose. The machine, "
                 "the radii of the legs, and what is asked and shown stay.",
@@ -217,23 +221,23 @@ class DesignPanel:
                 ),
                 is_in_palette=True,
             )
-            controls.dropdown(
+            self.dropdown(
                 "On a change",
                 "What a change of the design keeps: the pose, or the lengths of the legs.",
                 HOLDS,
                 "hold",
                 is_in_palette=True,
             )
-            controls.button(
+            self.button(
                 "Reset",
                 "Return to the design as it was opened.",
                 actions.reset_design,
                 icon=viser.Icon.RESTORE,
             )
-        with controls.folder("Design variables ({unit})"):
+        with self.folder("Design variables ({unit})"):
             gui.add_html(read_file("sketch.svg"))
             for index, name in enumerate(VARIABLES):
-                controls.slider(
+                self.slider(
                     name,
                     VARIABLE_HINTS[name],
                     ControlBinding(
@@ -243,7 +247,7 @@ class DesignPanel:
                     partial(ranges.variable_span, index=index),
                     power=1,
                 )
-            controls.number(
+            self.number(
                 "1 unit (mm)",
                 "Millimetres in one design unit: variables, limits and home grow with it. The "
                 "machine, the radii of the legs, and what is asked keep their millimetres.",
@@ -251,18 +255,18 @@ class DesignPanel:
                 least=1e-6,
                 step=0.001,
             )
-            controls.dropdown(
+            self.dropdown(
                 "Lengths in",
                 "Unit in which lengths are shown and typed, here and everywhere on the page.",
                 get_args(LengthName),
                 "view.lengths",
                 is_in_palette=True,
             )
-        with controls.folder("Limits ({unit})", is_open=False):
+        with self.folder("Limits ({unit})", is_open=False):
             self._add_limits(in_degrees=False)
-        with controls.folder("Radii of the legs ({unit})", is_open=False):
+        with self.folder("Radii of the legs ({unit})", is_open=False):
             for leg in range(4):
-                controls.slider(
+                self.slider(
                     f"leg {leg + 1}",
                     f"Radius of leg {leg + 1}, a capsule about its axis.",
                     f"design.limits.leg_radii.{leg}",
@@ -271,10 +275,6 @@ class DesignPanel:
                 )
         with gui.add_folder("Swing of the joints (°)", expand_by_default=False):
             self._add_limits(in_degrees=True)
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
-        yield from self._controls.updates(frame)
 
     def _add_limits(self, *, in_degrees: bool) -> None:
         """Add the controls of those limits that are angles, or of the others."""
@@ -285,12 +285,12 @@ class DesignPanel:
             if limit.switch is not None and limit.switch not in switches:
                 switches.append(limit.switch)
                 words = limit.switch.label, limit.switch.hint
-                self._controls.checkbox(*words, bound_switch(limit.switch))
+                self.checkbox(*words, bound_switch(limit.switch))
             for entry in limit.entries:
                 self._add_entry(limit, entry)
 
     def _add_entry(self, limit: Limit, entry: LimitSlider) -> None:
-        add = self._controls.slider if entry.is_number else self._controls.ends
+        add = self.slider if entry.is_number else self.ends
         add(
             entry.label,
             entry.hint,
@@ -320,6 +320,7 @@ MECHANISM = Feature(
     manual="mechanism.md",
     tabs=(
         Tab("build", "Pose", MovePanel, viser.Icon.ARROWS_MOVE),
+        Tab("build", "Pose", ModesPanel),
         Tab("build", "Design", DesignPanel, viser.Icon.RULER_2),
     ),
     bar=(("left", DesignName), ("middle", lambda _: limits_figure)),

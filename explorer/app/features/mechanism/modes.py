@@ -9,6 +9,7 @@ import numpy as np
 from explorer.app.features.feature import Services, show
 from explorer.app.features.mechanism import bodies
 from explorer.app.features.mechanism.incidences import HoveredRow
+from explorer.app.inputs.controls import Controls
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
 from explorer.app.scene.shapes import (
     GHOST,
@@ -46,15 +47,16 @@ def mode_hover(services: Services) -> HoveredRow:
     return HoveredRow(services, HOVER, range(len(MODES)))
 
 
-class ModesPanel:
+class ModesPanel(Controls):
     """The present mode; the table of all, with the switch for their ghosts in its head."""
 
     def __init__(self, services: Services) -> None:
-        gui, buttons = services.gui, services.buttons
+        super().__init__(services)
+        buttons = services.buttons
         services.get(mode_hover)
-        self._present = gui.add_html("")
-        with gui.add_folder("8 modes", expand_by_default=False):
-            self._table = gui.add_html("")
+        self.markup(present_mode)
+        with services.gui.add_folder("8 modes", expand_by_default=False):
+            self.markup(lambda frame: modes_table(frame, chips.buttons(frame.state)))
         services.do_on_press(GO, lambda mode: set_mode(int(mode)), set("01234567"))
         ghosts = StateCommand(
             f"Pose › {GHOSTS_LABEL}",
@@ -64,16 +66,11 @@ class ModesPanel:
             words="Ghosts",
             spoken=GHOSTS_LABEL,
         )
-        self._ghosts = Chips(buttons, services.session, "modes.ghosts", "", {"": ghosts})
+        chips = Chips(buttons, services.session, "modes.ghosts", "", {"": ghosts})
         for mode in range(len(MODES)):
             hint = f"Assemble the same leg lengths with the signs {mode_name(mode)} of δ1, δ2, δ3."
             label = f"Pose › Assembly mode › {mode}: {mode_name(mode)}"
             buttons.offer(label, hint, GO, str(mode))
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
-        yield self._present, "content", present_mode(frame)
-        yield self._table, "content", modes_table(frame, self._ghosts.buttons(frame.state))
 
 
 def present_mode(frame: Frame) -> str:

@@ -7,13 +7,12 @@ from html import escape
 
 import viser
 
-from explorer.app.features.feature import Services, show_html
+from explorer.app.features.feature import Services
 from explorer.app.features.paths import stops
 from explorer.app.features.paths.state import Paths, Stop, StopAt
 from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import Action
-from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
@@ -28,7 +27,6 @@ from explorer.numerics.number_text import (
     format_number,
     snap_to_decimals,
 )
-from explorer.page.widgets.assigning import Updates
 
 PRESENT, TYPED = "Present pose", "Typed numbers"
 MODES = tuple(f"Mode {mode}:  {mode_name(mode)}" for mode in range(8))
@@ -38,104 +36,97 @@ DECIMALS = 9
 ZERO: Triple = (0.0, 0.0, 0.0)
 
 
-class StopsEditor:
-    """The list of poses, and the fields of the one that is chosen."""
-
-    def __init__(self, services: Services, controls: Controls) -> None:
-        gui, session = services.gui, services.session
-        self._list = gui.add_html("")
-        controls.dropdown(
-            "Pose",
-            "The chosen pose of the list: the present one, an assembly mode of the present leg "
-            "lengths by the signs of δ1 δ2 δ3, or numbers, typed or by its handle in the scene. "
-            "Present, the first one follows the platform, and the others are kept as numbers.",
-            OPTIONS,
-            ControlBinding(lambda frame: _option(frame.state), _choose),
-            visible=_is_chosen,
-        )
-        for index, words, hint, step in (
-            (0, "x, y, z ({unit})", "Coordinates of b4 or of the tool point in the base.", 0.01),
-            (1, "angles (°)", "Yaw, pitch and roll of the platform, in degrees.", 0.1),
-        ):
-            controls.triple(
-                f"Pose {words}",
-                hint,
-                ControlBinding(
-                    lambda frame, index=index: typed_numbers(frame.state)[index],
-                    lambda state, triple, index=index: _set_typed(state, index, triple),
-                ),
-                step=step,
-                power=1 - index,
-                visible=lambda state: Paths.of(state).edited_pose is not None,
-            )
-        controls.number(
-            "Pause (s)",
-            "Time for which the platform rests in the chosen pose.",
+def add_stops(services: Services, controls: Controls) -> None:
+    """Add the list of poses to a panel, and the fields of the one that is chosen."""
+    controls.markup(lambda frame: markup.box(list_stops(frame.state), acts))
+    controls.dropdown(
+        "Pose",
+        "The chosen pose of the list: the present one, an assembly mode of the present leg "
+        "lengths by the signs of δ1 δ2 δ3, or numbers, typed or by its handle in the scene. "
+        "Present, the first one follows the platform, and the others are kept as numbers.",
+        OPTIONS,
+        ControlBinding(lambda frame: _option(frame.state), _choose),
+        visible=_is_chosen,
+    )
+    for index, words, hint, step in (
+        (0, "x, y, z ({unit})", "Coordinates of b4 or of the tool point in the base.", 0.01),
+        (1, "angles (°)", "Yaw, pitch and roll of the platform, in degrees.", 0.1),
+    ):
+        controls.triple(
+            f"Pose {words}",
+            hint,
             ControlBinding(
-                lambda frame: stop.pause if (stop := _stop(frame.state)) else 0.0,
-                lambda state, pause: stops.set_stop(
-                    state, f"pause {format_number(pause)} s", pause=pause
-                ),
+                lambda frame, index=index: typed_numbers(frame.state)[index],
+                lambda state, triple, index=index: _set_typed(state, index, triple),
             ),
-            least=0.0,
-            step=0.1,
-            visible=_is_chosen,
+            step=step,
+            power=1 - index,
+            visible=lambda state: Paths.of(state).edited_pose is not None,
         )
-        changes: dict[str, Callable[[State, int], Action | None]] = {
-            "choose": lambda _, i: stops.choose_stop(i),
-            "copy": stops.copy_stop,
-            "lift": stops.lift_stop,
-            "remove": stops.remove_stop,
-        }
-
-        def on_row(name: str, change: Callable[[State, int], Action | None]) -> None:
-            def of_row(value: str) -> Callable[[State], Action | None] | None:
-                index = int(value) if value.isdecimal() else -1
-
-                def change_row(state: State) -> Action | None:
-                    return change(state, index) if 0 <= index < len(stops.stops_of(state)) else None
-
-                return change_row
-
-            services.do_on_press(f"paths.{name}", of_row)
-
-        for name, change in changes.items():
-            on_row(name, change)
-        self._acts = [
-            services.link(
-                "paths.add",
-                StateCommand(
-                    "Paths › Add the present pose",
-                    "Add the present pose to the path, after the chosen one or as the last.",
-                    stops.add_present,
-                ),
+    controls.number(
+        "Pause (s)",
+        "Time for which the platform rests in the chosen pose.",
+        ControlBinding(
+            lambda frame: stop.pause if (stop := _stop(frame.state)) else 0.0,
+            lambda state, pause: stops.set_stop(
+                state, f"pause {format_number(pause)} s", pause=pause
             ),
-            services.link(
-                "paths.close",
-                StateCommand(
-                    "Paths › Back to the first pose",
-                    "End the path in its first pose.",
-                    stops.close_path,
-                ),
+        ),
+        least=0.0,
+        step=0.1,
+        visible=_is_chosen,
+    )
+    changes: dict[str, Callable[[State, int], Action | None]] = {
+        "choose": lambda _, i: stops.choose_stop(i),
+        "copy": stops.copy_stop,
+        "lift": stops.lift_stop,
+        "remove": stops.remove_stop,
+    }
+
+    def on_row(name: str, change: Callable[[State, int], Action | None]) -> None:
+        def of_row(value: str) -> Callable[[State], Action | None] | None:
+            index = int(value) if value.isdecimal() else -1
+
+            def change_row(state: State) -> Action | None:
+                return change(state, index) if 0 <= index < len(stops.stops_of(state)) else None
+
+            return change_row
+
+        services.do_on_press(f"paths.{name}", of_row)
+
+    for name, change in changes.items():
+        on_row(name, change)
+    links = (
+        services.link(
+            "paths.add",
+            StateCommand(
+                "Paths › Add the present pose",
+                "Add the present pose to the path, after the chosen one or as the last.",
+                stops.add_present,
             ),
-        ]
+        ),
+        services.link(
+            "paths.close",
+            StateCommand(
+                "Paths › Back to the first pose",
+                "End the path in its first pose.",
+                stops.close_path,
+            ),
+        ),
+    )
+    acts = f'<div class="ex-ends">{"".join(links)}</div>'
 
-        def take(data: bytes, name: str, client: viser.ClientHandle | None) -> None:
-            who = None if client is None else client.client_id
-            session.do(lambda state: stops.stops_in_table(state, data, name), who=who)
+    def take(data: bytes, name: str, client: viser.ClientHandle | None) -> None:
+        who = None if client is None else client.client_id
+        services.session.do(lambda state: stops.stops_in_table(state, data, name), who=who)
 
-        services.add_upload(
-            "Poses from a file …",
-            "A table of poses such as explorer inverse --poses reads (CSV); a column pause_s has "
-            "the pauses.",
-            "text/csv",
-            take,
-        )
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the list show the frame."""
-        acts = f'<div class="ex-ends">{"".join(self._acts)}</div>'
-        yield from show_html(self._list, markup.box(list_stops(frame.state), acts))
+    services.add_upload(
+        "Poses from a file …",
+        "A table of poses such as explorer inverse --poses reads (CSV); a column pause_s has "
+        "the pauses.",
+        "text/csv",
+        take,
+    )
 
 
 def list_stops(state: State) -> str:

@@ -8,10 +8,11 @@ from html import escape
 
 import viser
 
-from explorer.app.features.feature import Services, html_of, show_html
+from explorer.app.features.feature import Services, html_of
+from explorer.app.features.loads.load import Loads
 from explorer.app.features.paths import actions, plots, stops
 from explorer.app.features.paths.actions import DRIVES_FEED, DrivesDrawing
-from explorer.app.features.paths.editor import StopsEditor
+from explorer.app.features.paths.editor import add_stops
 from explorer.app.features.paths.state import PathKind, Paths, journey_of
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
@@ -28,8 +29,8 @@ from explorer.export.tables import trajectory_csv
 from explorer.files.extras import is_missing
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.numerics.number_text import format_number
-from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key
+from explorer.paths.loads import PathLoads
 
 LAWS = {
     "Slow enough to watch": "watchable",
@@ -51,13 +52,12 @@ CANCEL = Set("paths.planning", None, "Planning", "stopped")
 CLEAR = Set("paths.journey", None, "Path", "cleared")
 
 
-class PathsPanel:
+class PathsPanel(Controls):
     """The poses and the kind of a path, and the path that was made, in its one time."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._session = services.gui, services.session
-        self._loads = plots.LoadsAlong(services)
-        self._downloads, self._controls = services.downloads, Controls(services)
+        super().__init__(services)
+        gui, self._downloads, self._loads = services.gui, services.downloads, services.get(Loads)
         kinds = {
             kind: StateCommand(f"Paths › {words}", hint, *choose("paths.kind", kind, "Path"))
             for kind, (words, hint) in KINDS.items()
@@ -70,17 +70,17 @@ class PathsPanel:
         self._kind_chips = Chips(services.buttons, services.session, "paths.kind", "", kinds)
         gui.add_html(markup.beside(2))
         with gui.add_folder("Path"):
-            self._editor = StopsEditor(services, self._controls)
-            self._kinds = gui.add_html("")
-            self._controls.checkbox(
+            add_stops(services, self)
+            self.markup(self._kinds)
+            self.checkbox(
                 "Hold the load",
                 "Demand that the load of the tab Loads, with the weights chosen there, stays "
                 "within the limits of actuators, struts and guide all along the path.",
                 "paths.holds_load",
                 visible=_is_planned,
             )
-            self._demand = gui.add_html("")
-            self.go = self._controls.button(
+            self.markup(lambda frame: plots.demand_note(frame.state))
+            self.go = self.button(
                 "Go",
                 "Make the path along the poses, and play it.",
                 actions.go,
@@ -88,7 +88,8 @@ class PathsPanel:
                 main=True,
                 keys=(Key("J"),),
             )
-            self._controls.number(
+            self.follow(self.go, "disabled", lambda frame: Paths.of(frame.state).is_planning)
+            self.number(
                 "Time limit (s)",
                 "Time after which the search for a path stops without one.",
                 "paths.seconds",
@@ -97,14 +98,14 @@ class PathsPanel:
                 visible=_is_planned,
             )
         with gui.add_folder("Time"):
-            self._controls.dropdown(
+            self.dropdown(
                 "Time law",
                 "Time that the path takes, in playback, charts, files and motors alike. The "
                 "platform rests at every pose.",
                 LAWS,
                 At("paths.law", action=actions.SetLaw),
             )
-            self._controls.number(
+            self.number(
                 "Duration (s)",
                 "Time that the path takes with its pauses: in each move the fastest actuator "
                 "accelerates over one half of its travel and brakes over the other, always by the "
@@ -114,14 +115,14 @@ class PathsPanel:
                 step=0.01,
                 visible=lambda state: Paths.of(state).law == "duration",
             )
-            self._controls.dropdown(
+            self.dropdown(
                 "Playback",
                 "Play in the time of the path, or slower, which the bar then tells.",
                 SLOWER,
                 "paths.slower",
             )
-            self._title = gui.add_html("")
-            self.time = self._controls.slider(
+            self.markup(self._title)
+            self.time = self.slider(
                 "Time (s)",
                 "Time on the path.",
                 ControlBinding(
@@ -131,9 +132,9 @@ class PathsPanel:
                 _time_span,
                 visible=lambda state: journey_of(state) is not None,
             )
-            self._margins = gui.add_html("", visible=False)
+            self.markup(margins_chart)
         with gui.add_folder("Drives"):
-            self._drives = gui.add_html("")
+            self.markup(self._drives_html)
         services.do_on_press("paths.play", lambda on: actions.play(on == "on"), ("on", "off"))
         services.do_on_press("paths.cancel", lambda _: CANCEL)
         self._clear = services.link(
@@ -159,25 +160,18 @@ class PathsPanel:
             is_ready=lambda: journey_of(self._session.state) is not None,
         )
 
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
+    def _kinds(self, frame: Frame) -> str:
         state = frame.state
-        yield from self._editor.updates(frame)
         chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
-        missing = self._missing["planning"] if Paths.of(state).kind == "planned" else ""
-        kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>', missing)
-        yield self._kinds, "content", kinds
-        yield self.go, "disabled", Paths.of(state).is_planning
-        title = plan_words(state) or path_title(state, self._loads.shares(frame), self._clear)
-        yield self._title, "content", title
-        yield from show_html(self._demand, plots.demand_note(state))
-        journey = journey_of(state)
-        chart = "" if journey is None else plots.margins_html(journey, state.unit)
-        yield from show_html(self._margins, chart)
-        yield self._drives, "content", self._drives_html(state)
-        yield from self._controls.updates(frame)
+        missing = self._missing["planning"] if _is_planned(state) else ""
+        return markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>', missing)
 
-    def _drives_html(self, state: State) -> str:
+    def _title(self, frame: Frame) -> str:
+        loads = plots.loads_along(journey_of(frame.state), self._loads.of(frame))
+        return plan_words(frame.state) or path_title(frame.state, loads, self._clear)
+
+    def _drives_html(self, frame: Frame) -> str:
+        state = frame.state
         if journey_of(state) is None:
             return markup.box(markup.dim("What a path asks of the motors, once there is one."))
         if Paths.of(state).law == "shortest" and self._missing["timing"]:
@@ -191,6 +185,12 @@ class PathsPanel:
             unit_mm = 1.0 if state.view.lengths == "mm" else None
             data = trajectory_csv(journey.trajectory, unit_mm).encode()
             self._downloads.send(client.client_id, f"{journey.design.name}-path.csv", data)
+
+
+def margins_chart(frame: Frame) -> str:
+    """Return the margins over the path of a frame as HTML; "" without one."""
+    journey = journey_of(frame.state)
+    return "" if journey is None else plots.margins_html(journey, frame.state.unit)
 
 
 @lru_cache(2)
@@ -230,7 +230,7 @@ def plan_words(state: State) -> str | None:
     return None
 
 
-def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") -> str:
+def path_title(state: State, loads: PathLoads | None, clear: str = "") -> str:
     """Return the title of the path, its crossings and loads, and its buttons, as HTML."""
     journey = journey_of(state)
     if journey is None:
@@ -259,7 +259,7 @@ def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") 
         f"{export}{clear}</div>",
         f'<div class="{look}">{escape(markup.sentence(times))}</div>',
         plots.crossing_words(journey, state.unit),
-        "" if loads is None else plots.load_words(loads),
+        "" if loads is None else plots.load_words(journey, loads),
     )
 
 

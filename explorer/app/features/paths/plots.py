@@ -7,27 +7,28 @@ from dataclasses import replace
 from functools import lru_cache
 from html import escape
 from itertools import groupby
-from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.app.features.feature import Services
-from explorer.app.features.loads.load import Loads
-from explorer.app.features.paths.state import Journey, Paths, journey_of
-from explorer.app.state.frame import Frame
+from explorer.app.features.paths.state import Journey, Paths
 from explorer.app.state.state import State
 from explorer.app.widgets.markup import margin_name, note, swatch
 from explorer.export.drawings.charts import Chart, ends_of
 from explorer.export.drawings.markup import circle, drawing_text, line, page_picture
 from explorer.measures.blocks.block import MOST_SHARE, Share
+from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins, mode_of
-from explorer.mechanism.pose import Pose, rotation_from_quaternion
+from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.mechanism.rgb import ORANGE, css
+from explorer.motion.weights import MovingBodies
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import Unit, format_decimals, format_number
+from explorer.paths.crossings import path_margins
 from explorer.paths.loads import DemandedLoad, PathLoads
 from explorer.singularity.colours import MARGIN_COLOURS
+from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, has_limits
 
 # Dashes of the margins' lines beside their colours, and the marks of the legend.
@@ -39,22 +40,10 @@ SIZE, PLACE = "0 0 280 112", (46.0, 204.0, 6.0, 82.0)
 MOST_LISTED = 4
 
 
-class JourneyLoads(NamedTuple):
-    """The shares of the limits along a path, and the times of their samples in seconds."""
-
-    time: FloatArray
-    path: PathLoads
-
-    @property
-    def seconds(self) -> float:
-        """Time at which the largest share occurs."""
-        return float(np.interp(self.path.place, self.path.at, self.time))
-
-
-def load_words(loads: JourneyLoads) -> str:
-    """Return the largest share of a limit along a path, its bound and its place, as HTML."""
-    share, bound, part = loads.path.utilisation, loads.path.bound, loads.path.part
-    at = f"at {format_decimals(loads.seconds, 2)} s"
+def load_words(journey: Journey, loads: PathLoads) -> str:
+    """Return the largest share of a limit along a path, its bound and its time, as HTML."""
+    share, bound, part = loads.utilisation, loads.bound, loads.part
+    at = f"at {format_decimals(journey.time_at(loads.place), 2)} s"
     hint = ""
     if part is None:
         words = f"Nothing holds a load {at}: singular" if share else "No part bears a load"
@@ -62,7 +51,7 @@ def load_words(loads: JourneyLoads) -> str:
         number = f"{format_number(100.0 * share, 3)} %" if share < MOST_SHARE else "∞"
         most = "no bound" if math.isinf(bound) else f"{format_number(100.0 * bound, 3)} % at most"
         words = f"Largest share {number} ({most}): {PART_NAMES[part]}, {at}"
-        hint = f"That of {len(loads.time)} samples; in parentheses a bound of all between them"
+        hint = f"That of {len(loads.at)} samples; in parentheses a bound of all between them"
     return f'<div class="ex-{Share(share).look}" title="{hint}">{escape(words)}</div>'
 
 
@@ -166,27 +155,16 @@ def crossing_words(journey: Journey, unit: Unit) -> str:
     return f"<div>{dot}{closed}Singular {times}: {listed}</div>"
 
 
-class LoadsAlong:
-    """The shares of the limits along the last path, under the last load."""
+def loads_along(journey: Journey | None, loaded: LoadedPose) -> PathLoads | None:
+    """Return the shares of the limits along a path; None without a path or without limits."""
+    if journey is None or not has_limits(loaded.design):
+        return None
+    load = journey.design, loaded.load, loaded.weights
+    return _loads_along(journey.poses, journey.tool, *load)
 
-    def __init__(self, services: Services) -> None:
-        self._loads = services.get(Loads)
-        self._key: tuple[object, ...] = ()
-        self._shares: JourneyLoads | None = None
 
-    def shares(self, frame: Frame) -> JourneyLoads | None:
-        """Return the shares along the path of a frame; None without a path or without limits.
-
-        They are computed anew if path or load change.
-        """
-        journey, loaded = journey_of(frame.state), self._loads.of(frame)
-        if journey is None or not has_limits(loaded.design):
-            return None
-        path = journey.design, journey.path
-        key = *path, loaded.load, loaded.weights
-        if key != self._key:
-            demanded = DemandedLoad.of(journey.design, loaded.load, loaded.weights)
-            along, timed = demanded.over(journey.margins, journey.tool), journey.trajectory
-            self._shares = JourneyLoads(np.interp(along.at, timed.at, timed.time), along)
-            self._key = key
-        return self._shares
+@lru_cache(maxsize=1)
+def _loads_along(
+    poses: tuple[Pose, ...], tool: Triple | None, design: Design, load: Six, weights: MovingBodies
+) -> PathLoads:
+    return DemandedLoad.of(design, load, weights).over(path_margins(poses, tool=tool), tool)

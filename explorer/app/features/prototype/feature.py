@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, FileExport, Services, Tab, show_html
+from explorer.app.features.feature import Feature, FileExport, Services, Tab
 from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype import work
 from explorer.app.features.prototype.building import (
@@ -46,15 +46,15 @@ ASSEMBLIES = {
 }
 
 
-class PrototypePanel:
+class PrototypePanel(Controls):
     """Whether the machine can be built; controls that draw, explode and list its parts."""
 
     def __init__(self, services: Services) -> None:
+        super().__init__(services)
         gui, self._feed = services.gui, services.get(PARTS_FEED)
         self._verdict, self._build = services.get(BuildVerdict), services.get(BUILD_FEED)
-        self._built = gui.add_html("")
-        self._controls = controls = Controls(services)
-        controls.checkbox(
+        self.markup(self._built)
+        self.checkbox(
             "Show the parts",
             "Draw the mechanism as parts that can be made: sized from the design, the radii of "
             "its legs and its unit.",
@@ -64,37 +64,34 @@ class PrototypePanel:
             ),
         )
         gui.add_html(note("Sized from the design; Export has them for printers and CAD."))
-        self._trouble = gui.add_html("", visible=False)
-        self._folder = gui.add_folder("Parts", visible=False)
-        with self._folder:
-            controls.slider(
+        self.markup(lambda frame: trouble_of(frame, self._feed))
+        folder = gui.add_folder("Parts", visible=False)
+        # A failure in the worker takes the parts away at any time.
+        self.follow(folder, "visible", lambda _: parts_to_draw(self._feed) is not None)
+        with folder:
+            self.slider(
                 "Exploded",
                 "The exploded view: 0 together, 1 each part by itself.",
                 "view.prototype.exploded",
                 Span(0.0, 1.0, 0.01),
             )
-            controls.number(
+            self.number(
                 "Density (kg/m³)",
                 "Density of all parts. Aluminium 2700, steel 7850, printed PLA 1240.",
                 "view.prototype.density",
                 least=1.0,
                 step=1.0,
             )
-            self._bill = gui.add_html("")
+            self.markup(self._bill)
 
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that show a frame."""
-        feed, built = self._feed, self._build.drawing
+    def _built(self, _: Frame) -> str:
+        built = self._build.drawing
         strokes = "" if built is None else f'<div class="ex-after">{strokes_table(built)}</div>'
-        yield self._built, "content", box(self._verdict.html(), strokes)
-        yield from self._controls.updates(frame)
-        yield from show_html(self._trouble, trouble_of(frame, feed))
-        # A failure in the worker takes the parts away at any time.
-        parts = parts_to_draw(feed)
-        yield self._folder, "visible", parts is not None
-        if parts is not None:
-            density = frame.state.view.prototype.density
-            yield self._bill, "content", parts_table(parts, density)
+        return box(self._verdict.html(), strokes)
+
+    def _bill(self, frame: Frame) -> str:
+        parts = parts_to_draw(self._feed)
+        return "" if parts is None else parts_table(parts, frame.state.view.prototype.density)
 
 
 def trouble_of(frame: Frame, feed: PartsFeed) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import viser
 
@@ -29,7 +29,6 @@ from explorer.find.requirement import (
     encode_requirement,
     legs_from_row,
 )
-from explorer.page.widgets.assigning import Update
 
 Field = tuple[str, str, float, str]
 """A number of the form: its label, its field, its step, and what it means."""
@@ -80,47 +79,44 @@ ROW_HINT = "A row of a data sheet, such as: stroke 150 retracted 220 push 300 N 
 CHECK = Set("required.is_checked", True, "Check the requirement")
 
 
-class RequirementPanel:
+class RequirementPanel(Controls):
     """The form, the buttons that search and check, and the machines that were found."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._services = services.gui, services
-        self._finder, self._controls = services.get(Finder), Controls(services)
+        super().__init__(services)
+        gui, self._services, self._finder = services.gui, services, services.get(Finder)
         gui.add_html(beside(2))
         with gui.add_folder("The task"):
             hint = "Edges of the box that the tool must reach, with home in its middle."
-            self._controls.triple("Box (mm)", hint, f"{FORM}.box_mm", step=1.0)
+            self.triple("Box (mm)", hint, f"{FORM}.box_mm", step=1.0)
             self._add_numbers(TASK)
             hint = "What is best among the machines that keep the requirement."
-            self._controls.dropdown("Prefer", hint, PREFERRED, f"{FORM}.prefer")
+            self.dropdown("Prefer", hint, PREFERRED, f"{FORM}.prefer")
             hint = "Demand that the parts of the machine fit into each other."
-            self._controls.checkbox("Buildable", hint, f"{FORM}.buildable")
+            self.checkbox("Buildable", hint, f"{FORM}.buildable")
         with gui.add_folder("The legs"):
             self._add_numbers(LEGS)
         with gui.add_folder("More", expand_by_default=False), services.commands.within("More"):
             self._add_more(gui)
         gui.add_html(beside(3))
-        self._find = self._button("Find machines", FIND_HINT, self._finder.start)
-        self._find.color = MAIN
-        self._cancel = self._button("Cancel", CANCEL_HINT, lambda _, __: self._finder.cancel())
-        self._check = self._controls.button("Check this design", CHECK_HINT, lambda: CHECK)
+        find = self._button("Find machines", FIND_HINT, self._finder.start)
+        find.color = MAIN
+        cancel = self._button("Cancel", CANCEL_HINT, lambda _, __: self._finder.cancel())
+        check = self.button("Check this design", CHECK_HINT, lambda: CHECK)
+        self.follow(find, "visible", lambda _: self._finder.job is None)
+        self.follow(cancel, "visible", lambda _: self._finder.job is not None)
+        self.follow(check, "disabled", lambda frame: Required.of(frame.state).is_checked)
         self._button("Save as a file", SAVE_HINT, self._save)
-        self._result = gui.add_html("")
+        self.markup(self._result)
         services.buttons.on(PREPARE, lambda _, __: self._finder.prepare())
         services.buttons.on(words.RELAX, self._relax, values=INDICES)
         services.do_on_press(words.OPEN, self._open, INDICES)
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that show the requirement of a frame and what was found."""
-        yield from self._controls.updates(frame)
-        finder, part = self._finder, Required.of(frame.state)
-        is_on = finder.job is not None
-        yield self._find, "visible", not is_on
-        yield self._cancel, "visible", is_on
-        yield self._check, "disabled", part.is_checked
-        look = "" if finder.requirement == part.form else "is-outdated"
-        content = "".join(words.result(finder.found, is_searching=is_on))
-        yield self._result, "content", box(f'<div class="{look}">{content}</div>')
+    def _result(self, frame: Frame) -> str:
+        finder = self._finder
+        look = "" if finder.requirement == Required.of(frame.state).form else "is-outdated"
+        content = "".join(words.result(finder.found, is_searching=finder.job is not None))
+        return box(f'<div class="{look}">{content}</div>')
 
     def _add_numbers(self, fields: Sequence[Field]) -> None:
         """Add fields for numbers, whose zeros are no demands where these would be None."""
@@ -128,19 +124,19 @@ class RequirementPanel:
             at = At(f"{FORM}.{field}")
             if value_at(BLANK, field) is None:
                 at = At(at.path, default=lambda _: 0.0, convert=lambda value: value or None)
-            self._controls.number(label, hint, at, least=0.0, step=step)
+            self.number(label, hint, at, least=0.0, step=step)
 
     def _add_more(self, gui: viser.GuiApi) -> None:
         for first in range(0, len(MORE), 2):
             gui.add_html(beside(2))
             self._add_numbers(MORE[first : first + 2])
         hint = "Centre of mass of the payload from b4, in the platform frame."
-        self._controls.triple("Centre (mm)", hint, f"{FORM}.payload.centre_mm", step=1.0)
+        self.triple("Centre (mm)", hint, f"{FORM}.payload.centre_mm", step=1.0)
         gui.add_html(beside(2))
         hint = "What a search may choose besides the machine and the yaw of the box."
-        self._controls.dropdown("Free", hint, FREE, f"{FORM}.free")
+        self.dropdown("Free", hint, FREE, f"{FORM}.free")
         hint = "Gravity pulls from the base to the platform."
-        self._controls.checkbox("Hanging", hint, ControlBinding(_is_hanging, _hang))
+        self.checkbox("Hanging", hint, ControlBinding(_is_hanging, _hang))
         gui.add_html(beside(2))
         self._row = gui.add_text("Data sheet", "", hint=ROW_HINT)
         self._button("Read the row", "Take the values of the row into the form.", self._read_row)

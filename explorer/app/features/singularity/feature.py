@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 import viser
 
-from explorer.app.features.feature import Feature, Services, Tab, show_html
+from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.mechanism.incidences import HOVER, margin_hover
 from explorer.app.features.singularity import scene, work
 from explorer.app.inputs.bindings import At
@@ -33,7 +33,6 @@ from explorer.mechanism.folds import FOLD_LINES, FOLDS
 from explorer.mechanism.margins import INCIDENCES, MARGIN_WORDS, TETRAHEDRA, signs_of
 from explorer.mechanism.rgb import css
 from explorer.numerics.number_text import format_decimals, format_fitted
-from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import shift
 from explorer.singularity import colours, strata
 from explorer.singularity.strata import GENERIC, Stratum
@@ -45,32 +44,32 @@ NEEDLE = 15.0
 FOLD_HINT = "The fold on a dial: a red end is flat, and a flat fold is a singular pose."
 
 
-class SingularityPanel:
+class SingularityPanel(Controls):
     """The verdict, its reason and the margins; below "More" the strata and the performance."""
 
     def __init__(self, services: Services) -> None:
+        super().__init__(services)
         gui, buttons = services.gui, services.buttons
         services.get(margin_hover)
-        self._controls = controls = Controls(services)
-        self._summary = gui.add_html("")
-        self._copy = services.copy_button(
+        copy = services.copy_button(
             "Singularity", lambda state: pose_command("singularity", state.design, state.pose)
         )
-        self._table = gui.add_html("")
+        self.markup(lambda frame: summary(frame, copy))
+        self.markup(distance_table)
         services.do_on_press(GO, lambda value: work.go_to_singularity(int(value)), {"1", "2", "3"})
         for incidence in (1, 2, 3):
             buttons.offer(f"Singularity › Go to δ{incidence} = 0", GO_HINT, GO, str(incidence))
         with gui.add_folder("More", expand_by_default=False):
-            controls.dropdown(
+            self.dropdown(
                 "Ghost",
                 "Draw the nearest pose with an incidence, and the displacements of b1 to b4 to it.",
                 get_args(Ghost),
                 "view.singular.ghost",
                 is_in_palette=True,
             )
-            self._strata = StrataPanel(services)
-            self._performance = gui.add_html("")
-            controls.dropdown(
+            add_strata(services, self)
+            self.markup(lambda frame: measures_table(frame) + performance_table(frame))
+            self.dropdown(
                 "Ellipsoid",
                 "Draw at b4 or at the tool point all velocities that unit actuator speeds reach, "
                 "or all forces that unit actuator forces hold.",
@@ -78,13 +77,13 @@ class SingularityPanel:
                 "view.singular.ellipsoid",
                 is_in_palette=True,
             )
-            controls.checkbox(
+            self.checkbox(
                 "Singularity-free ball",
                 "Draw the largest ball of positions without a singular one at this orientation, "
                 "and the point where it touches the singular plane.",
                 "view.singular.ball",
             )
-            controls.number(
+            self.number(
                 "Warn below ({unit})",
                 "Warning length of all margins, to which those of motions, turns "
                 "and 1/cond J are proportional: what is below is orange.",
@@ -93,14 +92,6 @@ class SingularityPanel:
                 step=lambda state: length_span(state).step,
                 power=1,
             )
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
-        yield self._summary, "content", summary(frame, self._copy)
-        yield self._table, "content", distance_table(frame)
-        yield from self._strata.updates(frame)
-        yield self._performance, "content", measures_table(frame) + performance_table(frame)
-        yield from self._controls.updates(frame)
 
 
 def summary(frame: Frame, corner: str = "") -> str:
@@ -219,33 +210,26 @@ GOALS = {"".join(map(str, w)): w for w in strata.STRATA if w != GENERIC}
 """The strata that the diagram leads to, by the values of their buttons."""
 
 
-class StrataPanel:
-    """The present stratum, those that one more incidence leads to, and the diagram."""
+def add_strata(services: Services, controls: Controls) -> None:
+    """Add the present stratum, those that one more incidence leads to, and the diagram."""
+    feed = services.get(work.STRATA_FEED)
+    controls.markup(lambda frame: neighbours(frame, distances_of(frame, feed)))
+    controls.checkbox(
+        "Diagram",
+        "Draw which of the 24 relative positions of the two flags border on each other; a "
+        "click on one moves the mechanism to the nearest pose in it.",
+        "view.singular.strata",
+    )
 
-    def __init__(self, services: Services) -> None:
-        gui = services.gui
-        self._feed = services.get(work.STRATA_FEED)
-        self._words = gui.add_html("")
-        self._controls = Controls(services)
-        self._controls.checkbox(
-            "Diagram",
-            "Draw which of the 24 relative positions of the two flags border on each other; a "
-            "click on one moves the mechanism to the nearest pose in it.",
-            "view.singular.strata",
-        )
-        self._diagram = gui.add_html("", visible=False)
-        services.do_on_press(PRESS, lambda digits: work.go_to_stratum(GOALS[digits]), GOALS)
-        for digits, stratum in GOALS.items():
-            label = f"Go to {work.stratum_name(stratum)}: {strata.describe_stratum(stratum)}"
-            services.buttons.offer(f"Singularity › {label}", f"{label}.", PRESS, digits)
+    def diagram_of(frame: Frame) -> str:
+        is_shown = frame.state.view.singular.strata
+        return diagram(frame, distances_of(frame, feed)) if is_shown else ""
 
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
-        yield from self._controls.updates(frame)
-        distances = distances_of(frame, self._feed)
-        has_diagram = frame.state.view.singular.strata
-        yield from show_html(self._diagram, diagram(frame, distances) if has_diagram else "")
-        yield self._words, "content", neighbours(frame, distances)
+    controls.markup(diagram_of)
+    services.do_on_press(PRESS, lambda digits: work.go_to_stratum(GOALS[digits]), GOALS)
+    for digits, stratum in GOALS.items():
+        label = f"Go to {work.stratum_name(stratum)}: {strata.describe_stratum(stratum)}"
+        services.buttons.offer(f"Singularity › {label}", f"{label}.", PRESS, digits)
 
 
 def distances_of(frame: Frame, feed: work.StrataFeed) -> Mapping[Stratum, float]:

@@ -76,30 +76,24 @@ CAMERA_HINTS = {
 VIEW_KEYS = {"Isometric": "0", "Front": "1", "Side": "3", "Top": "7", FIT: "F"}
 
 
-class OverlaysMenu:
+class OverlaysMenu(Controls):
     """The form of the mechanism, and a switch for each layer of the scene."""
 
     def __init__(self, services: Services) -> None:
-        gui = services.gui
-        self._forms = _form_chips(services)
-        self._form_row = gui.add_html("")
-        self._controls = controls = Controls(services)
+        super().__init__(services)
+        gui, forms = services.gui, _form_chips(services)
+        self.markup(lambda frame: box(forms.html(frame.state)))
         with gui.add_folder("Layers"):
             for label, (name, keys) in LAYERS.items():
-                controls.checkbox(label, LAYER_HINTS[name], f"view.{name}", keys=keys)
+                self.checkbox(label, LAYER_HINTS[name], f"view.{name}", keys=keys)
         with gui.add_folder("Tetrahedra"), services.commands.within("Tetrahedra"):
             for index, points in enumerate(TETRAHEDRA):
-                controls.checkbox(
+                self.checkbox(
                     f"δ{index + 1}:  {' '.join(points)}",
                     f"The edges of the tetrahedron that is flat where δ{index + 1} is zero. Near "
                     "such a pose it is filled, and the gap that is left to it is drawn.",
                     f"view.tetrahedra.{index}",
                 )
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the panel show the frame."""
-        yield self._form_row, "content", box(self._forms.html(frame.state))
-        yield from self._controls.updates(frame)
 
 
 def _form_chips(services: Services) -> Chips:
