@@ -112,7 +112,7 @@ def test_design_is_renamed_copied_deleted_and_restored(
     save_as(desk, saved, "mine")
     for act, expected in (
         (lambda: saved.rename("mine", "yours"), ["yours"]),
-        (lambda: saved.copy(library.open("yours")), ["yours", "yours copy"]),
+        (lambda: saved.copy("yours"), ["yours", "yours copy"]),
         (lambda: saved.delete("yours"), ["yours copy"]),
         (saved.restore, ["yours", "yours copy"]),
         (saved.restore, ["yours", "yours copy"]),
@@ -214,7 +214,7 @@ def test_panel_lists_opens_copies_and_deletes_designs(
         ("duplicate", "mine <b>", ["mine <b> copy", "mine <b>"]),
         ("duplicate", "paper-initial", ["paper-initial copy", "mine <b> copy", "mine <b>"]),
         ("delete", "mine <b> copy", ["paper-initial copy", "mine <b>"]),
-        # What is no longer in the list is not opened, and presets are not deleted.
+        # What is no longer in the list is refused, and presets are not deleted.
         ("open", "gone", ["paper-initial copy", "mine <b>"]),
         ("delete", "paper-initial", ["paper-initial copy", "mine <b>"]),
     ):
@@ -225,7 +225,9 @@ def test_panel_lists_opens_copies_and_deletes_designs(
     desk.click(panel.restore)
     markup_of_rows(desk, saved, panel)
     assert rows_of(saved.entries)[0].name == "mine <b> copy"
-    assert desk.complaints == []
+    gone, preset = desk.complaints
+    assert "no design is called 'gone'" in gone
+    assert "no design is called 'paper-initial'" in preset
 
 
 def test_list_shows_what_other_explorers_save_the_last_on_top(

@@ -146,10 +146,6 @@ def value_text(measure: Measure, value: float, size: float, *, signed: bool = Fa
     return text
 
 
-def _size_of(values: list[float | None]) -> float:
-    return max((abs(value) for value in values if value is not None), default=0.0)
-
-
 def _hint_of(measure: Measure) -> str:
     return measure.hint if measure.sense is None else f"{measure.hint}; {measure.sense} is better"
 
@@ -203,7 +199,8 @@ def measure_row(
     defined.
     """
     values = [column.value(measure) for column in columns]
-    size, best, first = _size_of(values), best_of(measure, values), values[0]
+    best, first = best_of(measure, values), values[0]
+    size = max((abs(value) for value in values if value is not None), default=0.0)
     cells: list[str] = []
     for index, (column, value) in enumerate(zip(columns, values, strict=True)):
         mark = "ex-number is-best" if index in best else "ex-number"

@@ -108,12 +108,15 @@ class SavedDesigns:
         self._post(work, who)
 
     def open(self, name: str, who: Who = None) -> None:
-        """Open a saved design."""
-        self._post(lambda: self._session.do(open_design(self._library.open(name))), who)
+        """Open a saved design, or a preset with the present machine."""
+        if name in PRESETS:
+            self._session.do(partial(open_geometry, PRESETS[name]), who=who)
+        else:
+            self._post(lambda: self._session.do(open_design(self._library.open(name))), who)
 
-    def copy(self, design: Design, who: Who = None) -> None:
+    def copy(self, name: str, who: Who = None) -> None:
         """Save a copy of a design under a new name; the live one stays as it is."""
-        self._post(lambda: self._copy(design), who)
+        self._post(lambda: self._copy(PRESETS.get(name) or self._library.open(name)), who)
 
     def delete(self, name: str, who: Who = None) -> None:
         """Delete a saved design; `restore` brings it back."""
@@ -285,13 +288,11 @@ class DesignsPanel:
         )
         self.restore.on_click(lambda event: saved.restore(event.client_id))
         services.commands.offer(self.restore, _run(saved.restore))
-        acts: dict[str, Callable[[LibraryFile, Who], None]] = {
-            "open": self._open,
-            "duplicate": self._duplicate,
-            "delete": self._delete,
-        }
+        acts = {"open": saved.open, "duplicate": saved.copy, "delete": saved.delete}
         for name, act in acts.items():
-            services.buttons.on(f"designs.{name}", partial(self._press, act))
+            services.buttons.on(
+                f"designs.{name}", lambda name, client, act=act: act(name, client.client_id)
+            )
         self._listed: tuple[object, ...] = ()
         self._markup = ""
 
@@ -315,28 +316,6 @@ class DesignsPanel:
     def _rename(self, who: Who) -> None:
         state = self._session.latest_state()
         self._saved.rename(state.base.name, state.design.name, who)
-
-    def _open(self, row: LibraryFile, who: Who) -> None:
-        if row.name in PRESETS:
-            self._session.do(partial(open_geometry, PRESETS[row.name]), who=who)
-        else:
-            self._saved.open(row.name, who)
-
-    def _duplicate(self, row: LibraryFile, who: Who) -> None:
-        if row.design is not None:
-            self._saved.copy(row.design, who)
-
-    def _delete(self, row: LibraryFile, who: Who) -> None:
-        if row.name not in PRESETS:
-            self._saved.delete(row.name, who)
-
-    def _press(
-        self, act: Callable[[LibraryFile, Who], None], name: str, client: viser.ClientHandle
-    ) -> None:
-        for row in rows_of(self._saved.entries):
-            if row.name == name:
-                act(row, client.client_id)
-                return
 
 
 def rows_of(entries: Sequence[LibraryFile]) -> tuple[LibraryFile, ...]:
