@@ -105,3 +105,16 @@ def test_ctrl_s_saves_and_ctrl_z_undoes_wherever_the_focus_is(data_tab: Tab) -> 
     tab.page.keyboard.press("ControlOrMeta+z")
     tab.wait_for(lambda: saved.find("mine") is not None, "brought back")
     assert (tab.client.camera.position == eye).all(), "S moves the camera"
+
+
+def test_found_text_opens_the_folders_that_it_stands_in(tab: Tab) -> None:
+    page = tab.page
+    for words, head in (("Warn below", "More"), ("yaw of home", "Free variables")):
+        page.keyboard.press("ControlOrMeta+k")
+        page.keyboard.type(words)
+        found = page.locator(".ex-results > button[data-opens]").first
+        found.wait_for()
+        found.click()
+        tab.settle()
+        assert page.get_by_text(words).first.is_visible()
+        assert not page.locator(f'[aria-expanded="false"]:text-is("{head}"):visible').count()
