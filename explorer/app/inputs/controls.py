@@ -209,7 +209,7 @@ class Controls:
         *,
         is_in_palette: bool = False,
         **conditions: Unpack[Conditions],
-    ) -> None:
+    ) -> viser.GuiDropdownHandle[str]:
         """Add a list to choose from, whose options may all be commands.
 
         The options have their values if the source of the value is a path.
@@ -219,6 +219,7 @@ class Controls:
         control = self._bind(handle, bound_to(at, label, values), **conditions)
         for option in [each for each in options if is_in_palette and each != NO_OPTION]:
             self._commands.offer(handle, partial(control.use, option), option=option)
+        return handle
 
     def text(
         self, label: str, hint: str, at: Source[str], **conditions: Unpack[Conditions]

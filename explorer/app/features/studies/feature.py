@@ -31,7 +31,6 @@ from explorer.app.features.studies.state import (
 from explorer.app.features.studies.words import BUTTONS, acts, chips, head, legend, table
 from explorer.app.features.studies.work import study_feed, study_runner
 from explorer.app.inputs.bindings import At, ControlBinding
-from explorer.app.inputs.bound import Control
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.session.session import Change, Who
@@ -92,45 +91,42 @@ class PlotEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 DECODER = msgspec.json.Decoder(PlotEvent)
 
 
-class StudiesPanel:
+class StudiesPanel(Controls):
     """The plots, legend and table of the open study, and the controls of a new one."""
 
     def __init__(self, services: Services) -> None:
+        super().__init__(services)
         gui, session, none = services.gui, services.session, (NO_OPTION,)
         gui.add_html(beside(2))
         self._services = services
-        self._session = session
         self._complain = services.complain
-        self.choice = gui.add_dropdown(
+        self.runner, self.feed = services.get(study_runner), services.get(study_feed)
+        self.choice = self.dropdown(
             "Study",
+            "A study of the data folder, or one named on the command line.",
             none,
-            hint="A study of the data folder, or one named on the command line.",
-        )
-        self._control = Control[str](
-            session,
-            self.choice,
             ControlBinding(
                 lambda frame: Studies.of(frame.state).name or NO_OPTION,
                 lambda _, name: open_study(None if name == NO_OPTION else name),
             ),
         )
+        self.follow(self.choice, "options", self._names)
         self._acts = gui.add_html("")
         self._head = gui.add_html("")
         # viser's folders cannot be folded from here; one without a title is shown or hidden.
         with gui.add_folder(None, visible=False) as self.form:
             self._add_new_study(services)
+        self.follow(self.form, "visible", self._is_new)
         self.lines = gui.add_html("")
-        self._axes_mark = gui.add_html(beside(3), visible=False)
-        self._axes: list[tuple[viser.GuiDropdownHandle[str], Control[str]]] = []
+        self.follow(gui.add_html(beside(3)), "visible", lambda _: self._axes != none)
         for axis, (label, hint) in AXES.items():
-            handle = gui.add_dropdown(label, none, hint=hint, visible=False)
-            self._axes.append((handle, Control[str](session, handle, self._bind_axis(axis))))
+            handle = self.dropdown(label, hint, none, self._bind_axis(axis))
+            self.follow(handle, "options", lambda _: self._axes)
+            self.follow(handle, "visible", lambda _: self._axes != none)
         self.legend = gui.add_html("")
         gui.add_html(beside(2, wide=True))
         self.points = gui.add_html("")
         self.table = gui.add_html("")
-        self.runner = services.get(study_runner)
-        self.feed = services.get(study_feed)
         services.buttons.on("studies.plot", self._receive)
         run_script(services.server, read_script("plots"))
         self._add_buttons(services.buttons)
@@ -140,19 +136,8 @@ class StudiesPanel:
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
         studies, drawing, run = Studies.of(frame.state), self.feed.drawing, self.runner.run
-        names = (NO_OPTION, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
-        yield self.choice, "options", names
-        yield from self._control.updates(frame)
-        axes = (NO_OPTION,) if drawing is None or drawing.plotted is None else drawing.plotted.axes
-        has_axes = axes != (NO_OPTION,)
-        yield self._axes_mark, "visible", has_axes
-        for handle, control in self._axes:
-            yield handle, "options", axes
-            yield handle, "visible", has_axes
-            yield from control.updates(frame)
-        is_new = run is None and studies.name is None
-        yield self.form, "visible", is_new
-        yield from self._controls.updates(frame)
+        yield from super().updates(frame)
+        is_new = self._is_new(frame)
         # The texts are made again only after a change.
         lengths = frame.state.view.lengths
         key = (drawing, studies, run, self.feed.problem, is_new, frame.state.design, lengths)
@@ -174,6 +159,19 @@ class StudiesPanel:
         yield self.legend, "content", "" if drawing is None else legend(drawing)
         yield self.table, "content", "" if drawing is None else table(drawing)
         yield self.chips, "content", chips(studies.plan, frame.state.design, frame.state.unit)
+
+    def _is_new(self, frame: Frame) -> bool:
+        return self.runner.run is None and Studies.of(frame.state).name is None
+
+    def _names(self, frame: Frame) -> tuple[str, ...]:
+        name = Studies.of(frame.state).name
+        return (NO_OPTION, *dict.fromkeys((*self.feed.names, *filter(None, (name,)))))
+
+    @property
+    def _axes(self) -> tuple[str, ...]:
+        """The axes of the plots; none to choose from without plots."""
+        drawing = self.feed.drawing
+        return (NO_OPTION,) if drawing is None or not drawing.plotted else drawing.plotted.axes
 
     def pick(self, index: int, who: Who) -> None:
         """Open the design with an index in the open study."""
@@ -223,16 +221,15 @@ class StudiesPanel:
 
     def _add_new_study(self, services: Services) -> None:
         gui = services.gui
-        self._controls = controls = Controls(services)
         gui.add_html(beside(2))
-        controls.slider(
+        self.slider(
             "Number of designs",
             "How many designs are computed, spread evenly over the ranges by a Sobol sequence; "
             "powers of two spread best.",
             At("studies.plan.count", convert=round),
             Span(*COUNTS, 1.0),
         )
-        controls.slider(
+        self.slider(
             "Range, ± %",
             "How far each variable goes to both sides of its value in the live design: a share of "
             "the value, or of a 20th of the reach where that is more; for the yaw a share of 90°.",
