@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 from collections.abc import Generator
@@ -113,3 +114,12 @@ def warm_kernels() -> None:
     """Load all kernels before the first test that asks for it."""
     import_all()
     warm()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _searches_end_by_their_work() -> Generator[None]:  # pyright: ignore[reportUnusedFunction]
+    """Let no search for machines end by the clock, however busy the machine is."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("find", "nearest"):
+            patch.setattr(f"explorer.find.{module}.PATIENCE", math.inf)
+        yield

@@ -11,7 +11,6 @@ import pytest
 from needs import NEEDS, requirement_of, violations
 
 from explorer import PRESETS, InputError
-from explorer.find import find
 from explorer.find.answers import FoundDesigns
 from explorer.find.check import check_requirement
 from explorer.find.find import find_designs
@@ -69,9 +68,7 @@ def test_find_designs_keep_the_requirement_in_all_poses(changes: dict[str, objec
             assert not built.short_legs
 
 
-def test_find_designs_with_one_seed_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    # A machine that is busy with other things ends no search by the clock.
-    monkeypatch.setattr(find, "PATIENCE", math.inf)
+def test_find_designs_with_one_seed_are_the_same() -> None:
     first, second = (find_designs(NEED, count=1, seconds=1.0, seed=3) for _ in range(2))
     assert [each.design for each in first.designs] == [each.design for each in second.designs]
     assert first.designs
@@ -93,11 +90,7 @@ def test_find_designs_cancelled_keep_what_was_found() -> None:
     assert (none.status, none.designs) == ("cancelled", ())
 
 
-def test_need_below_its_bound_is_refused_with_a_nearest_value_that_is_found(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    for module in ("find", "nearest"):
-        monkeypatch.setattr(f"explorer.find.{module}.PATIENCE", math.inf)
+def test_need_below_its_bound_is_refused_with_a_nearest_value_that_is_found() -> None:
     short = msgspec.structs.replace(NEED.legs, longest_mm=200.0)
     requirement = msgspec.structs.replace(NEED, legs=short)
     # A refusal takes no search.
