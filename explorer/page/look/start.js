@@ -17,7 +17,7 @@ window.explorer.start ??= async (address, size, count) => {
   const systemTheme = () => (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
   const choice = recall("theme") ?? "system";
   const theme = () => (choice === "system" ? systemTheme() : choice);
-  screen.dataset.theme = theme();
+  screen.style.colorScheme = theme();
 
   const leave = () => {
     const { messageQueue, nodeRefFromName } = window.__viserMutable ?? {};

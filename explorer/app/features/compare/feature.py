@@ -200,7 +200,7 @@ def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
             f"+ {escape(name)}",
             hint=f"Pin {name} beside the live design",
             label=f"Pin {name}",
-            class_name="ex-chip ex-cut ex-pin",
+            class_name="ex-chip ex-cut",
         )
         for name, design in choices.items()
         if compared.slot_of(design) is None and without_name(design) != without_name(state.design)

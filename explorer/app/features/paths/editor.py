@@ -152,7 +152,7 @@ def _row(state: State, index: int, stop: Stop, *, is_chosen: bool, is_own: bool)
             sign,
             hint=words,
             label=words,
-            class_name="ex-link ex-act",
+            class_name="ex-link",
             is_disabled=not is_there,
         )
     what = "present" if stop.at is None else f"mode {stop.at}"
