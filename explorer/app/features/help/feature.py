@@ -116,8 +116,9 @@ def lessons_html(services: Services) -> str:
             f"<div>{button(f'{label}{at + 1}  {step.title}', BEGIN, LESSON, f'{file}#{at}')}</div>"
             for at, step in enumerate(lesson.steps)
         )
+        begins = button(lesson.title, lesson.sentence, LESSON, f"{file}#0")
         rows += (
-            f'<div class="ex-export"><div><b>{escape(lesson.title)}</b>'
+            f'<div class="ex-export"><div><b data-closes>{begins}</b>'
             f'<div class="ex-dim">{escape(lesson.sentence)}</div>'
             f"{button(f'{label}Handout', HINTS['Handout'], HANDOUT, file)}</div>"
             f"<div data-closes>{steps}</div></div>"
