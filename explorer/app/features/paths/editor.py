@@ -164,7 +164,7 @@ def _row(state: State, index: int, stop: Stop, *, is_chosen: bool, is_own: bool)
         f"{number}. {pause}{name}{numbers_of(state, stop.at)}",
         hint="Change this pose",
         label=f"Pose {number}",
-        class_name="ex-fill ex-cut",
+        class_name="ex-fill",
         is_on=is_chosen,
     )
     look = "ex-row is-here" if is_chosen else "ex-row" if is_own else "ex-row ex-dim"
