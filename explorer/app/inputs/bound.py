@@ -66,7 +66,7 @@ class Control(Generic[Value]):
         """Set another value, as a command of a client does."""
         self.session.post(self, lambda state: self.bound.write(state, value), who=client.client_id)
 
-    def toggle(self, client: viser.ClientHandle) -> None:
+    def toggle(self: Control[bool], client: viser.ClientHandle) -> None:
         """Set the other one of two values, as a command of a client does."""
         # What the handle shows may be older than the state.
         self.session.do(

@@ -264,14 +264,15 @@ def _scene(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     _check_format(file_format, "scene", "html", "htm")
     design = command.read_design()
     pose = command.pose(design)
-    from explorer.app.features.sharing.scene_files import FileCamera, scene_html
+    from explorer.app.features.sharing.scene_files import camera_messages, scene_html
     from explorer.app.scene.camera import FIELD_OF_VIEW, framing
     from explorer.app.server import start
 
     running = start(design, pose, port=0)
     try:
         state = running.page.session.state
-        camera = FileCamera(*framing(running.page.corners(), "isometric", ASPECT), FIELD_OF_VIEW)
+        view = framing(running.page.corners(), "isometric", ASPECT)
+        camera = camera_messages(*view, FIELD_OF_VIEW)
         date = dt.datetime.now().astimezone().date()
         data = scene_html(running.viser, state, camera, date=date)
     finally:
