@@ -70,11 +70,13 @@ from explorer.app.features.paths.stops import (
     poses_of,
     remove_stop,
     set_stop,
+    set_stops,
     stops_in_table,
     stops_of,
 )
+from explorer.app.features.sharing.links import decode_link, open_link
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import Action, Set
+from explorer.app.state.actions import Action, Set, open_design
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import set_variable
 from explorer.app.state.moves import set_pose, set_position
@@ -603,6 +605,15 @@ def test_chosen_pose_has_the_handle_and_is_dragged_by_it(services: Services, des
     # Once the path is made, the handle is that of the platform again.
     desk.session.do(go())
     assert place() == pytest.approx(scale * np.array(TILTED.position))
+
+
+def test_opened_design_and_link_have_the_handle_at_their_platform() -> None:
+    stops = (Stop(TILTED), Stop(GOAL))
+    state = set_stops(stops, 1, "two").apply(open_state(OPTIMAL))
+    assert Paths.of(state).edited_pose == GOAL
+    for action in (open_design(PRESETS["buildable"]), open_link(decode_link("buildable"))):
+        paths = Paths.of(action.apply(state))
+        assert (len(paths.stops), paths.handled, paths.edited_pose) == (2, "", None)
 
 
 def test_pauses_of_a_planned_path_are_at_its_poses(services: Services) -> None:

@@ -216,8 +216,8 @@ class Paths(FeaturePart, name="paths"):
         return "" if self.edited_pose is None else f"stops.{self.chosen}.at"
 
     def on_open(self) -> Self:
-        """Return the part for another design: the settings of the next path."""
-        return replace(self, planning=None, problem=None, journey=None)
+        """Return the part for another design: the settings of the next path; no pose is edited."""
+        return replace(self, chosen=None, planning=None, problem=None, journey=None)
 
     def for_step(self) -> Self:
         """Return the part as the history keeps it: without planning and playing."""
