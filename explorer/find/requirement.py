@@ -227,7 +227,7 @@ def load_requirement(path: str | Path) -> Requirement:
     return decode_requirement(read_at_most(Path(path)), str(path))
 
 
-_LENGTHS = {"mm": 1.0, "m": 1e3, "μm": 1e-3, "um": 1e-3}
+_LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "μm": 1e-3, "um": 1e-3}
 _FORCES = {"N": 1.0, "kN": 1e3}
 _SPEEDS = {f"{unit}/s": factor for unit, factor in _LENGTHS.items()}
 _RATES = {f"{unit}2": factor for unit, factor in _SPEEDS.items()}
@@ -248,7 +248,14 @@ _COLUMNS: Mapping[str, tuple[str, Mapping[str, float]]] = {
     "retracted": ("retracted", _LENGTHS),
 }
 # A word, a number after it, and what follows, which may be a unit or the next word.
-_VALUE = re.compile(r"([A-Za-z]+)\)?\s*[:=]?\s*±?\s*(\d(?:[\d.,]*\d)?)(?=\s*([^\s,;]*))")
+_VALUE = re.compile(
+    r"(?<![A-Za-z])([A-Za-z]+)\)?\s*[:=]?\s*(?:±|\+/?-)?\s*"
+    r"((?:(?<=[\s:=])[-\u2212])?\d(?:[\d.,]*\d)?(?:[eE][-+]?\d+)?)(?=\s*([^\s,;]{0,20}))"
+)
+# A decimal comma; one before three digits may as well separate thousands.
+_COMMA = re.compile(r"(?<=\d),(?=\d+$)(?!\d{3}$)|(?<=^0),(?=\d+$)")
+MOST_ROW = 1000
+"""Largest number of letters of a row of a data sheet."""
 
 
 def legs_from_row(text: str, legs: RequiredLegs) -> RequiredLegs:
@@ -256,17 +263,22 @@ def legs_from_row(text: str, legs: RequiredLegs) -> RequiredLegs:
 
     The row states each value as a word out of push, pull, force, speed, acceleration, stiffness,
     accuracy (or error), diameter and ratio, and a number with its unit, such as "push 300 N"; units
-    that are left out are those of the fields. "stroke" and "retracted" give the ratio and the
-    longest leg.
+    that are left out are those of the fields. "stroke" and "retracted" give together the ratio and
+    the longest leg.
 
     Raises:
-        InputError: No value is found, or one is no number or in another unit.
+        InputError: The row is too long, no value is found, or one is no number or in another unit.
     """
+    if len(text) > MOST_ROW:
+        raise InputError(f"a row has at most {MOST_ROW} letters; got {len(text)}: paste one alone")
     found = dict[str, float]()
-    for word, number, after in _VALUE.findall(unicodedata.normalize("NFKC", text)):
+    row = " ".join(unicodedata.normalize("NFKC", text).split())
+    for word, number, following in _VALUE.findall(row):
         field, units = _COLUMNS.get(word.lower(), ("", {}))
         if not field:
             continue
+        # The end of a sentence or a bracket is no part of a unit.
+        after = following.rstrip(".)")
         if after in units:
             factor = units[after]
         elif not after or after.lower() in _COLUMNS:
@@ -275,16 +287,19 @@ def legs_from_row(text: str, legs: RequiredLegs) -> RequiredLegs:
             allowed = f"in {', '.join(units)}" if units else "without a unit"
             raise InputError(f"{word} is given {allowed}; got {number} {after}")
         try:
-            found[field] = factor * float(number)
+            found[field] = factor * float(_COMMA.sub(".", number.replace("\N{MINUS SIGN}", "-")))
         except ValueError:
             raise InputError(f"{word} is a number such as 1500.5; got {number}") from None
-    stroke, retracted = found.pop("stroke", None), found.pop("retracted", None)
-    if stroke is not None and retracted is not None:
-        longest = stroke + checks.positive("retracted", retracted)
+    ends = [name for name in ("stroke", "retracted") if name in found]
+    if len(ends) == 1:
+        raise InputError(f"stroke and retracted give the legs only together; got {ends[0]} alone")
+    if ends:
+        stroke, retracted = (checks.positive(name, found.pop(name)) for name in ends)
+        longest = stroke + retracted
         found |= {"ratio": longest / retracted, "longest_mm": longest}
     if not found:
         raise InputError(
-            f"no value in {text!r}: name each, such as 'stroke 150 retracted 220 push 300 N speed "
+            "no value in the row: name each, such as 'stroke 150 retracted 220 push 300 N speed "
             "50 mm/s'"
         )
     return msgspec.structs.replace(legs, **found)

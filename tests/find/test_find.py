@@ -162,13 +162,24 @@ def test_row_of_a_data_sheet_gives_its_values() -> None:
     metric = legs_from_row("push 3 kN, speed 0.05 m/s; accuracy ±50 µm", RequiredLegs())
     assert (metric.push_n, metric.speed_mm_s) == (3000.0, 50.0)
     assert metric.error_mm == pytest.approx(0.05)
+    sheet = legs_from_row("diameter 1 in; push 300,5 N (accuracy +/-0,125 mm), speed 5 cm/s.", legs)
+    assert (sheet.push_n, sheet.diameter_mm) == (300.5, pytest.approx(25.4))
+    assert (sheet.error_mm, sheet.speed_mm_s) == (0.125, 50.0)
+    assert legs_from_row("Force-20 push 1.5e3", legs).push_n == 1500.0
 
 
 @pytest.mark.parametrize(
     ("row", "reason"),
     [
         ("LA-20, blue", "no value"),
-        ("stroke 150", "no value"),
+        ("stroke 150", "only together; got stroke alone"),
+        ("retracted 220 push 300 N", "only together; got retracted alone"),
+        ("push -300 N", r"push_n must be positive; got -300"),
+        ("push \u2212300 N", r"push_n must be positive; got -300"),
+        ("push 1e-14 N", "push_n must be at least 1e-07 in size"),
+        ("push 1.500,5 N", "got 1.500,5"),
+        (f"push{980 * ' '}300 lbf", "in N, kN; got 300 lbf"),
+        ("long" * 2000, "^a row has at most 1000 letters; got 8000"),
         ("push 300 lbf", "in N, kN; got 300 lbf"),
         ("push 1,500 N", "got 1,500"),
         ("stroke 150 retracted 0", "retracted"),
