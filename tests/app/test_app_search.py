@@ -15,7 +15,7 @@ from page_props import TAG
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.help.search import ASK, RUN, TITLE, SearchDialog
 from explorer.app.server import Running
-from explorer.page.widgets.search import Entry, find, lines_of, normalise
+from explorer.page.widgets.search import MOST_MISTYPED, Entry, find, lines_of, normalise
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +93,12 @@ def test_search_lists_no_term_before_a_command_of_its_words(entries: list[Entry]
         assert command in found
         before = found[: found.index(command)]
         assert "manual" not in [each.kind for each in before], (name, kinds)
+
+
+def test_search_takes_a_few_mistyped_words_for_known_ones_and_no_more(entries: list[Entry]) -> None:
+    meant = find(MOST_MISTYPED * "singularity ", entries)
+    assert meant == find(MOST_MISTYPED * "singularty ", entries) != []
+    assert find((MOST_MISTYPED + 1) * "singularty ", entries) == []
 
 
 def test_search_of_nothing_and_of_no_words_finds_nothing(entries: list[Entry]) -> None:

@@ -26,8 +26,8 @@ KINDS: tuple[Kind, ...] = ("command", "text", "manual")
 
 # Elements of HTML that stand in a line with others; what is within any other is a line of its own.
 INLINE = {"a", "b", "em", "i", "kbd", "small", "span", "strong", "sub", "sup", "td", "th"}
-# Elements without an end, and likeness of a mistyped word.
-VOID, LIKENESS = {"br", "img", "input", "hr"}, 0.75
+# Elements without an end; likeness of a mistyped word, and the most such words of a query.
+VOID, LIKENESS, MOST_MISTYPED = {"br", "img", "input", "hr"}, 0.75, 4
 
 
 @dataclass(frozen=True)
@@ -69,12 +69,17 @@ def find(query: str, entries: Iterable[Entry]) -> list[Entry]:
     Those whose own name is the query come first, then those whose name begins with it, then those
     whose label has its words, and last those whose sentence has them; among equals commands come
     before texts of the page, and these before the manual. A word that nothing has counts as the one
-    most like it.
+    most like it; with more than `MOST_MISTYPED` of them nothing is found.
     """
     found = list(entries)
     words = normalise(query).split()
     known = "\n".join(f"{normalise(each.label)} {normalise(each.does)}" for each in found)
-    words = [word if word in known else _closest(word, known) for word in words]
+    unknown = [index for index, word in enumerate(words) if word not in known]
+    if len(unknown) > MOST_MISTYPED:
+        return []
+    for index in unknown:
+        near = difflib.get_close_matches(words[index], {*known.split()}, 1, LIKENESS)
+        words[index] = near[0] if near else words[index]
     ranked = [(_rank(words, each), index) for index, each in enumerate(found)] if words else []
     return [found[index] for rank, index in sorted(ranked) if rank < NOT_FOUND]
 
@@ -90,11 +95,6 @@ def _rank(words: list[str], entry: Entry) -> tuple[int, ...]:
     name, query = re.sub(r" \(.*\)$", "", label.rpartition(STEP)[2]), " ".join(words)
     level = 0 if name == query else 1 if name.startswith(query) else 2
     return level, KINDS.index(entry.kind), len(label)
-
-
-def _closest(word: str, known: str) -> str:
-    near = difflib.get_close_matches(word, {*known.split()}, 1, LIKENESS)
-    return near[0] if near else word
 
 
 def page_texts(gui: viser.GuiApi) -> Iterator[Entry]:
