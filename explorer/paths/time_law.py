@@ -203,11 +203,15 @@ class TimeLaw:
     def steps(self) -> FloatArray:
         """Times that the intervals take in seconds, shape (n,)."""
         if not len(self.pause):
-            return 2.0 * self.travel.ways(self.intervals) / self.speed.sum(axis=1)
+            return 2.0 * self._ways / self.speed.sum(axis=1)
         steps, moves = self.pause.copy(), self.pause == 0.0
-        led = self.intervals.select(moves)
-        steps[moves] = 2.0 * self.travel.ways(led) / self.speed[moves].sum(axis=1)
+        steps[moves] = 2.0 * self._ways[moves] / self.speed[moves].sum(axis=1)
         return steps
+
+    @cached_property
+    def _ways(self) -> FloatArray:
+        """How far the leader goes in each interval, shape (n,)."""
+        return self.travel.ways(self.intervals)
 
     @cached_property
     def time(self) -> FloatArray:
@@ -268,9 +272,39 @@ class TimeLaw:
 
     def at(self, time: FloatArray) -> Motion:
         """Return the motion at times (n,); at a corner, that with which the next move starts."""
-        index = np.clip(np.searchsorted(self.time, time, "right") - 1, 0, len(self.speed) - 1)
-        part = np.clip((time - self.time[index]) / self.steps[index], 0.0, 1.0)
-        return self._motion(index, part)
+        return self._motion(*self._within(time))
+
+    def places_at(self, time: FloatArray) -> FloatArray:
+        """Return the places at times (n,): the number of the move plus the share of it, (n,)."""
+        index, part = self._within(time)
+        return self.intervals.number[index] + self._shares(index, part)
+
+    def times_at(self, place: FloatArray) -> FloatArray:
+        """Return the times at places (n,), shape (n,); at a corner, that of the arrival there."""
+        led = self.intervals
+        index = np.searchsorted(led.number + led.share[:, 1], place)
+        index = np.clip(index, 0, len(self.speed) - 1)
+        led, (start, end) = led.select(index), self.speed[index].T
+        share = np.clip(place - led.number, *led.share.T)
+        gone = self.travel.ways(led._replace(share=np.stack([led.share[:, 0], share], axis=1)))
+        # Pauses have no way, and no speed at their ends.
+        way = np.where(self._ways > 0.0, self._ways, 1.0)[index]
+        square = start**2 + (end**2 - start**2) * np.minimum(gone / way, 1.0)
+        sums = start + np.sqrt(square)
+        return self.time[index] + 2.0 * gone / np.where(sums > 0.0, sums, 1.0)
+
+    def sample_times(self, samples: int) -> FloatArray:
+        """Return times with so many even intervals in each move, and one in each pause, (n,)."""
+        pause = self.pause if len(self.pause) else np.zeros(len(self.speed))
+        key = np.stack([self.intervals.number, pause > 0.0])
+        first = np.flatnonzero(np.diff(key, axis=1, prepend=-1).any(axis=0))
+        ends = self.time[np.append(first, len(pause))]
+        counts = np.where(pause[first] > 0.0, 1, samples)
+        parts = [
+            np.linspace(start, end, count, endpoint=False)
+            for start, end, count in zip(ends[:-1], ends[1:], counts.tolist(), strict=True)
+        ]
+        return np.append(np.concatenate(parts), self.duration)
 
     def within_intervals(self, parts: Sequence[float]) -> Motion:
         """Return the motion after parts, from 0 to 1, of the time of each interval, all in turn.
@@ -284,16 +318,26 @@ class TimeLaw:
         """Return the motion after parts of the time of intervals by index, shape (n,) each."""
         time = self.time[index] + part * self.steps[index]
         led, (start, end) = self.intervals.select(index), self.speed[index].T
-        speed = start + part * (end - start)
-        share, moves = led.share[:, 0].copy(), np.flatnonzero(start + end)
-        gone = (part * (start + speed))[moves] / (start + end)[moves]
-        share[moves] = self.travel.shares_after(led.select(moves), gone)
+        speed, share = start + part * (end - start), self._shares(index, part)
         slopes, curvatures = self.travel.derivatives(led.number, share)
         slope, curvature = (_pick(each, led.leader) for each in (slopes, curvatures))
         rate = speed / np.abs(slope)
         change = (self.acceleration[index] - np.sign(slope) * curvature * rate**2) / np.abs(slope)
         joints = slopes[:, :PLATFORM], curvatures[:, :PLATFORM]
         return Motion(time, led.number, share, rate, change, *joints)
+
+    def _within(self, time: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return the index of the interval at times (n,), and the part of its time, (n,) each."""
+        index = np.clip(np.searchsorted(self.time, time, "right") - 1, 0, len(self.speed) - 1)
+        return index, np.clip((time - self.time[index]) / self.steps[index], 0.0, 1.0)
+
+    def _shares(self, index: IntArray, part: FloatArray) -> FloatArray:
+        """Return the shares of moves after parts of intervals by index, shape (n,)."""
+        led, (start, end) = self.intervals.select(index), self.speed[index].T
+        share, moves = led.share[:, 0].copy(), np.flatnonzero(start + end)
+        gone = (part * (2.0 * start + part * (end - start)))[moves] / (start + end)[moves]
+        share[moves] = self.travel.shares_after(led.select(moves), gone)
+        return share
 
 
 def law_at_speed(

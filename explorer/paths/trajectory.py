@@ -1,8 +1,8 @@
 """Trajectories: paths over time, with the joints.
 
 The path has a time law of `explorer.paths.time_law`: if none is given, the fastest actuator has a
-speed all along, so that no other is faster. Samples are evenly spaced in time and lie on the path
-exactly; their joints come from inverse kinematics.
+speed all along, so that no other is faster. Samples are evenly spaced in time, or at given times,
+and lie on the path exactly; their joints come from inverse kinematics.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Trajectory:
     """A path over time.
 
     Attributes:
-        time: Time in seconds, from 0, evenly spaced, shape (n,).
+        time: Time in seconds, from 0, ascending, shape (n,).
         joints: (l1, d1, d2, d3, d4, l4), in design units, shape (n, 6).
         position: b4 in the base frame, in design units, shape (n, 3).
         quaternion: (w, x, y, z), without changes of sign between samples, shape (n, 4).
@@ -66,6 +66,7 @@ def trajectory(
     samples: int = DEFAULT_SAMPLES,
     tool: ArrayLike | None = None,
     law: TimeLaw | None = None,
+    times: FloatArray | None = None,
 ) -> Trajectory:
     """Return the trajectory along a path of straight moves.
 
@@ -74,10 +75,12 @@ def trajectory(
         poses: Corners of the path, two or more.
         speed: Speed of the fastest actuator, in design units per second; by default a tenth
             of the reach.
-        samples: Number of samples, both ends included.
+        samples: Number of samples, evenly spaced in time, both ends included.
         tool: Point that moves straight in the platform frame, shape (3,), in design units; None
             for b4.
         law: Time law of the path, in place of a speed; None for the speed from start to end.
+        times: Times of the samples in seconds, both ends included, ascending, shape (n,); None to
+            space them evenly.
 
     Raises:
         InputError: There are too few poses, too few or too many samples, the path has no length,
@@ -94,9 +97,9 @@ def trajectory(
         raise InputError(f"the speed must be above zero; got {actuator_speed:g}")
     moves, count = StraightMoves.along(poses, tool), len(poses) - 1
     law = law or law_at_speed(design, moves, actuator_speed)
-    sampled = np.linspace(0.0, law.duration, samples, dtype=np.float64)
-    motion = law.at(sampled)
-    at = motion.number + motion.share
+    even = np.linspace(0.0, law.duration, samples, dtype=np.float64)
+    sampled = even if times is None else times
+    at = law.places_at(sampled)
     # Moves without a length at either end take no time.
     at[0], at[-1] = 0.0, count
     number = np.minimum(at.astype(np.int64), count - 1)

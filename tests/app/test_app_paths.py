@@ -91,7 +91,7 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS
-from explorer.paths.drives import drives_along
+from explorer.paths.drives import drives_along, law_of_path
 from explorer.paths.loads import path_loads
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
@@ -213,7 +213,7 @@ def test_goal_is_the_neighbouring_mode_until_one_is_chosen_and_stays_once_it_is_
 def test_path_from_a_pose_to_itself_is_refused(start: StopAt, goal: StopAt) -> None:
     state = with_ends(open_state(OPTIMAL, TILTED), start, goal)
     for kind in ("straight", "planned"):
-        with pytest.raises(InputError, match="are the same pose: choose another goal"):
+        with pytest.raises(InputError, match="a path needs two poses that differ"):
             go().apply(Set("paths.kind", kind).apply(state))
 
 
@@ -221,7 +221,7 @@ def test_path_between_poses_that_differ_by_rounding_is_refused() -> None:
     state = open_state(OPTIMAL)
     x, y, z = state.pose.position
     nearby = Pose((x + 1e-7, y, z), state.pose.quaternion)
-    with pytest.raises(InputError, match="are the same pose"):
+    with pytest.raises(InputError, match="a path needs two poses that differ"):
         go().apply(with_ends(state, None, nearby))
     with pytest.raises(InputError, match="the path has no length"):
         Journey("planned", "Path", OPTIMAL, (state.pose, nearby))
@@ -557,6 +557,10 @@ def test_closed_path_between_modes_is_told_with_its_singular_poses() -> None:
         np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
     plain = crossing_words(path_of(go().apply(with_ends(state, TILTED, GOAL))), UNITS)
     assert "Closed" not in plain
+    there_and_back = close_path(with_ends(state, TILTED, GOAL))
+    assert there_and_back is not None
+    words = crossing_words(path_of(go().apply(there_and_back.apply(state))), UNITS)
+    assert "Closed path. No singular pose" in words
 
 
 def test_poses_and_pauses_are_taken_from_a_table() -> None:
@@ -732,6 +736,39 @@ def test_drives_are_those_of_the_path_as_it_is_played_and_exported() -> None:
         np.testing.assert_allclose(gone / OPTIMAL.unit_mm, joints[-1] - joints[0], atol=1e-3)
     with pytest.raises(InputError, match="a path needs a time above zero"):
         Set("paths.duration", 0.0).apply(state)
+
+
+def test_pauses_however_long_take_nothing_from_the_moves() -> None:
+    x, y, z = TILTED.position
+    lifted = Pose((x, y, z + 3.0), TILTED.quaternion)
+    stops = (Stop(TILTED, 30.0), Stop(lifted), Stop(GOAL, 300.0), Stop(TILTED))
+    state = SetLaw("paths.duration", 330.5).apply(open_state(OPTIMAL, TILTED))
+    state = SetLaw("paths.law", "duration").apply(set_stops(stops, None, "").apply(state))
+    journey = path_of(go().apply(state))
+    law, timed = law_of_path(OPTIMAL, journey.path), journey.trajectory
+    assert timed.duration == pytest.approx(330.5, rel=1e-12)
+    assert timed.position[:, 2].max() == pytest.approx(z + 3.0, abs=1e-12)
+    # Each of the three moves has its share of the rows, and the fastest of them is no slower.
+    assert np.diff(timed.at, prepend=-1.0).astype(bool).sum() >= 150
+    rates = np.abs(np.diff(timed.joints, axis=0) / np.diff(timed.time)[:, None])
+    fastest = drives_along(OPTIMAL, journey.path).summary.peak_speed.max() / OPTIMAL.unit_mm
+    assert rates.max() == pytest.approx(fastest, rel=0.05)
+    moves = np.flatnonzero(law.pause == 0.0)
+    for start, end in zip(law.time[moves], law.time[moves + 1], strict=True):
+        seconds = 0.7 * start + 0.3 * end
+        motion = law.at(np.array([seconds]))
+        p, r = law.travel.moves.poses(motion.number, motion.share)
+        np.testing.assert_allclose(journey.pose_at(seconds).position, p[0], atol=1e-12)
+        np.testing.assert_allclose(journey.pose_at(seconds).rotation, r[0], atol=1e-12)
+        assert journey.time_at(journey.place_at(seconds)) == pytest.approx(seconds, abs=1e-9)
+    assert {journey.pose_at(seconds) for seconds in (0.0, 7.0, 29.9, 330.5)} == {TILTED}
+    assert journey.pose_at(200.0) == GOAL
+
+
+def test_list_of_one_pose_that_is_not_the_present_one_is_no_path() -> None:
+    state = set_stops((Stop(TILTED),), None, "").apply(open_state(OPTIMAL, TILTED))
+    with pytest.raises(InputError, match=r"two poses that differ: add one to the list$"):
+        go().apply(state)
 
 
 def test_change_of_the_law_keeps_the_place_on_the_path() -> None:

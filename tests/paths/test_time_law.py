@@ -344,6 +344,27 @@ def test_law_with_pauses_is_that_without_them_and_rests_at_its_corners() -> None
         assert "as many pauses" in refusal(slower.with_pauses, wrong)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_times_of_places_are_those_at_which_the_law_is_there(seed: int) -> None:
+    design, path = random_case(seed)
+    pauses = np.random.default_rng(seed).uniform(0.0, 9.0, len(path)) * (np.arange(len(path)) % 2)
+    for law_of in laws_of(design):
+        for law in (law_of(path), law_of(path).with_pauses(pauses.tolist())):
+            time = np.linspace(0.0, law.duration, 301)
+            place, motion = law.places_at(time), law.at(time)
+            assert np.array_equal(place, motion.number + motion.share)
+            assert (np.diff(place) >= 0.0).all()
+            arrival = law.times_at(place)
+            assert_allclose(law.places_at(arrival), place, atol=1e-9)
+            assert (arrival <= time + 1e-9 * law.duration).all()
+            is_moving = motion.rate > 0.0
+            assert_allclose(arrival[is_moving], time[is_moving], atol=1e-9 * law.duration)
+            sampled = law.sample_times(20)
+            assert (np.diff(sampled) > 0.0).all()
+            assert (sampled[0], sampled[-1]) == (0.0, law.duration)
+            assert len(sampled) == 20 * (len(path) - 1) + np.count_nonzero(law.pause) + 1
+
+
 def test_moves_below_the_rounding_of_a_table_take_no_time() -> None:
     design, path = random_case(9)
     x, y, z = path[-1].position

@@ -46,10 +46,8 @@ def go(state: State) -> State:
     # A mode that follows the present one would be another one once the platform moves.
     stops, poses = stops_of(state), poses_of(state)
     if not StraightMoves.along(poses).have_length(state.design.reach).any():
-        raise InputError(
-            "the poses of the path are the same pose: choose another goal, or press Play to see "
-            "the last path again"
-        )
+        again = "" if journey_of(state) is None else ", or press Play to see the last path again"
+        raise InputError(f"a path needs two poses that differ: add one to the list{again}")
     cleared = _with(state, stops=stops, chosen=None, problem=None, planning=None, journey=None)
     if Paths.of(state).kind == "planned":
         return _with(cleared, request=Paths.of(state).request + 1, planning=poses)

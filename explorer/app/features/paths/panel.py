@@ -155,7 +155,7 @@ class PathsPanel(Controls):
         )
         buttons.offer(
             "Paths › Export CSV",
-            "Save time, joints and pose along the path, evenly spaced in time.",
+            "Save time, joints and pose along the path, in equal times of each move.",
             "paths.export",
             is_ready=lambda: journey_of(self._session.state) is not None,
         )
@@ -243,7 +243,8 @@ def path_title(state: State, loads: PathLoads | None, clear: str = "") -> str:
         "paths.export",
         "",
         "CSV",
-        hint="Save time, joints and pose, evenly spaced in time; lengths as the page shows them",
+        hint="Save time, joints and pose in equal times of each move, and both ends of each pause; "
+        "lengths as the page shows them",
         label="Export CSV",
         class_name="ex-button",
     )

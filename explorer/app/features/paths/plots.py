@@ -145,7 +145,7 @@ def crossing_words(journey: Journey, unit: Unit) -> str:
     if not places:
         index = int(np.argmin(along_path.least))
         return (
-            f'<div class="ex-within" title="{MARGIN_KINDS}">No singular pose; '
+            f'<div class="ex-within" title="{MARGIN_KINDS}">{closed}No singular pose; '
             f"least |δ{index + 1}| = {unit.text(float(along_path.least[index]), 3)}</div>"
         )
     more = len(places) - MOST_LISTED

@@ -28,6 +28,7 @@ from explorer.numerics.number_text import format_number
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.paths.drives import TimedPath, law_of_path
 from explorer.paths.planning import DEFAULT_SECONDS
+from explorer.paths.time_law import TimeLaw
 from explorer.paths.trajectory import DEFAULT_SAMPLES, Trajectory, trajectory
 
 PathKind = Literal["straight", "planned"]
@@ -67,6 +68,7 @@ class Stop:
 class Course(NamedTuple):
     """A path in time, and why it takes another time than it was asked to; None if it does not."""
 
+    law: TimeLaw
     timed: Trajectory
     problem: str | None
 
@@ -112,12 +114,12 @@ class Journey:
     @property
     def trajectory(self) -> Trajectory:
         """The path over time."""
-        return _course(self.design, self.path).timed
+        return self._course.timed
 
     @property
     def problem(self) -> str | None:
         """Why it has no law of the time that it is asked to take; None if it has one."""
-        return _course(self.design, self.path).problem
+        return self._course.problem
 
     @property
     def is_closed(self) -> bool:
@@ -146,13 +148,19 @@ class Journey:
 
     def place_at(self, seconds: float) -> float:
         """Return the place at a time: the number of the move plus the share of it."""
-        timed = self.trajectory
-        return float(np.interp(seconds, timed.time, timed.at))
+        law = self._course.law
+        # Moves without a length at either end take no time.
+        ends = {0.0: 0.0, law.duration: len(self.poses) - 1.0}
+        seconds = min(max(seconds, 0.0), law.duration)
+        return ends.get(seconds, float(law.places_at(np.array([seconds]))[0]))
 
     def time_at(self, place: float) -> float:
         """Return the time in seconds at a place."""
-        timed = self.trajectory
-        return float(np.interp(place, timed.at, timed.time))
+        return float(self._course.law.times_at(np.array([place]))[0])
+
+    @property
+    def _course(self) -> Course:
+        return _course_of(self.design, self.path)
 
 
 @dataclass(frozen=True)
@@ -160,7 +168,7 @@ class Paths(FeaturePart, name="paths"):
     """The path of the page, and the settings of the next one.
 
     Attributes:
-        stops: Poses of the next path; after a single one it goes to the mode beyond δ1 = 0.
+        stops: Poses of the next path; after the present one alone the mode beyond δ1 = 0.
         chosen: Index of the pose that is edited; None if none is.
         seconds: Longest time of planning, in seconds.
         law: Which time the path takes.
@@ -267,7 +275,7 @@ def is_playing(state: State) -> bool:
 
 
 @lru_cache(maxsize=MOST_CACHED)
-def _course(design: Design, path: TimedPath) -> Course:
+def _course_of(design: Design, path: TimedPath) -> Course:
     """Return a path in its time; one that has no law for it takes a time to watch."""
     problem, moves = None, len(path.poses) - 1
     try:
@@ -276,9 +284,9 @@ def _course(design: Design, path: TimedPath) -> Course:
         problem = str(error)
         watched = path._replace(duration=watchable_seconds(path.poses, path.pauses))
         law = law_of_path(design, watched)
-    samples = max(DEFAULT_SAMPLES, MOVE_SAMPLES * moves + 1)
-    timed = trajectory(design, path.poses, law=law, samples=samples, tool=path.tool)
-    return Course(timed, problem)
+    times = law.sample_times(max(DEFAULT_SAMPLES // moves, MOVE_SAMPLES))
+    timed = trajectory(design, path.poses, law=law, times=times, tool=path.tool)
+    return Course(law, timed, problem)
 
 
 @lru_cache(maxsize=MOST_CACHED)

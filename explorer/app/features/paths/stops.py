@@ -1,7 +1,7 @@
 """The poses of the next path as a list, and the actions that change it.
 
-The first pose follows the platform until another is added to the list; a list of one pose goes on
-to the mode beyond δ1 = 0. Assembly modes are those of the present leg lengths.
+The first pose follows the platform until another is added to the list; alone it is followed by the
+mode beyond δ1 = 0. Assembly modes are those of the present leg lengths.
 """
 
 from __future__ import annotations
@@ -44,9 +44,10 @@ def choose_stop(state: State, index: int) -> State:
 
 
 def stops_of(state: State) -> tuple[Stop, ...]:
-    """Return the poses of the next path; after a single one the mode beyond δ1 = 0."""
+    """Return the poses of the next path; after the present one alone the mode beyond δ1 = 0."""
     stops = Paths.of(state).stops
-    return stops if len(stops) > 1 else (*stops, Stop(state.mode ^ 4))
+    is_alone = [stop.at for stop in stops] == [None]
+    return (*stops, Stop(state.mode ^ 4)) if is_alone else stops
 
 
 def chosen_of(state: State) -> int | None:
