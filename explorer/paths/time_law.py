@@ -301,7 +301,7 @@ class TimeLaw:
         ends = self.time[np.append(first, len(pause))]
         counts = np.where(pause[first] > 0.0, 1, samples)
         parts = [
-            np.linspace(start, end, count, endpoint=False)
+            np.linspace(start, end, count, endpoint=False, dtype=np.float64)
             for start, end, count in zip(ends[:-1], ends[1:], counts.tolist(), strict=True)
         ]
         return np.append(np.concatenate(parts), self.duration)
