@@ -573,6 +573,11 @@ def test_poses_and_pauses_are_taken_from_a_table() -> None:
     assert poses_of(taken)[0].position == pytest.approx(expected.position)
     np.testing.assert_allclose(poses_of(taken)[0].rotation, expected.rotation, atol=1e-12)
     assert path_of(go().apply(taken)).pauses == (0.2, 0.0)
+    named = table.replace(b"pause_s", b"note,dwell_s").replace(b"0,0.2", b"0,a,0.2")
+    words = "Poses of the path from pick.csv: 2"
+    assert stops_in_table(state, table, "pick.csv").describe(state) == words
+    words += ", without its columns note, dwell_s"
+    assert stops_in_table(state, named, "pick.csv").describe(state) == words
     for data, words in (
         (b"x,y\n1,2\n", "no column z"),
         (b"x,y,z\n" + 51 * b"1,2,3\n", "at most 50"),

@@ -118,7 +118,13 @@ def add_stops(services: Services, controls: Controls) -> None:
 
     def take(data: bytes, name: str, client: viser.ClientHandle | None) -> None:
         who = None if client is None else client.client_id
-        services.session.do(lambda state: stops.stops_in_table(state, data, name), who=who)
+
+        def change(state: State) -> Action:
+            action = stops.stops_in_table(state, data, name)
+            services.tell(action.describe(state), who)
+            return action
+
+        services.session.do(change, who=who)
 
     services.add_upload(
         "Poses from a file …",

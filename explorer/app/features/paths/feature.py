@@ -166,8 +166,9 @@ class PathRunner(Runner):
 
 def open_poses(services: Services, data: bytes, name: str) -> tuple[Action, str]:
     """Return the action that takes a table of poses for the next path; see `Opener`."""
-    action = stops_in_table(services.session.latest_state(), data, name)
-    return action, "Poses of a path; the tab Paths has them."
+    state = services.session.latest_state()
+    action = stops_in_table(state, data, name)
+    return action, f"{action.describe(state)}; the tab Paths has them."
 
 
 PATHS = Feature(

@@ -162,7 +162,8 @@ def set_stop(state: State, text: str, **changes: object) -> Act | None:
 def stops_in_table(state: State, data: bytes, name: str) -> Act:
     """Return the action that takes the poses and pauses of a table; it is one of corners.
 
-    Positions are those of the tool where the table has columns of it.
+    Positions are those of the tool where the table has columns of it. The words of the action name
+    the columns that are not read.
 
     Raises:
         InputError: The table has none, or too many.
@@ -176,4 +177,5 @@ def stops_in_table(state: State, data: bytes, name: str) -> Act:
         )
     poses, pauses = read_corners(table, state.design, state.pose.rotation, at)
     stops = tuple(map(Stop, poses, pauses))
-    return set_stops(stops, None, f"Path of {len(stops)} poses from {name}")
+    left_out = f", without its columns {', '.join(table.skipped)}" if table.skipped else ""
+    return set_stops(stops, None, f"Poses of the path from {name}: {len(stops)}{left_out}")
