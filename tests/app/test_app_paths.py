@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import csv
 import io
+import math
 import os
 import re
 import signal
@@ -90,6 +91,7 @@ from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.checks import LEAST, MOST
 from explorer.numerics.number_text import UNITS
 from explorer.paths.drives import drives_along, law_of_path
 from explorer.paths.loads import path_loads
@@ -537,6 +539,8 @@ def test_poses_are_added_copied_moved_and_removed() -> None:
         Set("paths.stops", (Stop(), Stop())).apply(state)
     with pytest.raises(InputError, match="a pause must not be below zero"):
         Stop(TILTED, -0.1)
+    with pytest.raises(InputError, match="or above 1,000,000 s; got 1e\\+07 s"):
+        Stop(TILTED, 1e7)
 
 
 def test_closed_path_between_modes_is_told_with_its_singular_poses() -> None:
@@ -739,8 +743,12 @@ def test_drives_are_those_of_the_path_as_it_is_played_and_exported() -> None:
         time, joints = journey.trajectory.time, journey.trajectory.joints
         gone = np.trapezoid(found.at(time).speed, time, axis=0)
         np.testing.assert_allclose(gone / OPTIMAL.unit_mm, joints[-1] - joints[0], atol=1e-3)
-    with pytest.raises(InputError, match="a path needs a time above zero"):
-        Set("paths.duration", 0.0).apply(state)
+    for seconds in (0.0, 1e-200, 1e200, math.inf):
+        with pytest.raises(InputError, match="a path needs a time above zero, 1e-07 to 1,000,000"):
+            Set("paths.duration", seconds).apply(state)
+    for seconds in (LEAST, MOST):
+        allowed = path_of(Set("paths.duration", seconds).apply(state))
+        assert (allowed.problem, allowed.trajectory.duration) == (None, pytest.approx(seconds))
 
 
 def test_pauses_however_long_take_nothing_from_the_moves() -> None:

@@ -8,7 +8,6 @@ design there is none.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -24,7 +23,7 @@ from explorer.legs.moves import StraightMoves, poses_between
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.motion.masses import DENSITY
-from explorer.numerics.number_text import format_number
+from explorer.numerics.checks import LEAST, MOST
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.paths.drives import TimedPath, law_of_path
 from explorer.paths.planning import DEFAULT_SECONDS
@@ -54,15 +53,17 @@ class Stop:
     """A pose of the next path, and the pause in it in seconds.
 
     Raises:
-        InputError: The pause is below zero or not finite.
+        InputError: The pause is below zero or longer than `MOST` seconds.
     """
 
     at: StopAt = field(default=None, metadata=LENGTHS)
     pause: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.pause < math.inf:
-            raise InputError(f"a pause must not be below zero; got {self.pause:g} s")
+        if not 0.0 <= self.pause <= MOST:
+            raise InputError(
+                f"a pause must not be below zero or above {MOST:,.0f} s; got {self.pause:g} s"
+            )
 
 
 class Course(NamedTuple):
@@ -179,8 +180,9 @@ class Paths(FeaturePart, name="paths"):
         problem: Why planning failed; None if it did not.
 
     Raises:
-        InputError: A time for planning or for the path that is not above zero, no pose or too many,
-            one after the first that follows the present one, or an index below zero.
+        InputError: A time for planning or for the path is below `LEAST` or above `MOST` seconds, no
+            pose or too many, one after the first that follows the present one, or an index below
+            zero.
     """
 
     stops: tuple[Stop, ...] = field(default=(Stop(),), metadata=LENGTHS)
@@ -198,9 +200,9 @@ class Paths(FeaturePart, name="paths"):
 
     def __post_init__(self) -> None:
         for what, seconds in (("planning", self.seconds), ("a path", self.duration)):
-            if not (math.isfinite(seconds) and seconds > 0.0):
+            if not LEAST <= seconds <= MOST:
                 raise InputError(
-                    f"{what} needs a time above zero; got {format_number(seconds)} seconds"
+                    f"{what} needs a time above zero, {LEAST:g} to {MOST:,.0f} s; got {seconds:g} s"
                 )
         if not 1 <= len(self.stops) <= MOST_STOPS:
             raise InputError(
