@@ -120,7 +120,7 @@ class Page:
         studies: StudyFolders | None = None,
     ) -> None:
         self._server = server
-        self._notified: dict[str, float] = {}
+        self._notified: dict[tuple[str, Who], float] = {}
         # Notices without a browser, kept for the next one; the lock guards them.
         self._pending: list[tuple[str, str, Colour]] = []
         self._pending_lock = threading.Lock()
@@ -352,11 +352,11 @@ class Page:
         self._notify("Something went wrong", message, None)
 
     def _notify(self, title: str, message: str, who: Who, colour: Colour = WARNING) -> None:
-        now = clock.now()
-        if now - self._notified.get(message, -NOTICE_SECONDS) < NOTICE_SECONDS:
+        now, notice = clock.now(), (message, who)
+        if now - self._notified.get(notice, -NOTICE_SECONDS) < NOTICE_SECONDS:
             return
-        self._notified = {m: t for m, t in self._notified.items() if now - t < NOTICE_SECONDS}
-        self._notified[message] = now
+        self._notified = {n: t for n, t in self._notified.items() if now - t < NOTICE_SECONDS}
+        self._notified[notice] = now
         with self._pending_lock:
             clients = self._server.get_clients()
             if who is None and not clients:

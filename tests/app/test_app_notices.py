@@ -15,8 +15,10 @@ from client import Client, client_of, press_update, presses_in, wait_for
 from services import StubJobs
 
 from explorer.app.features.designs.feature import UNSAVED
+from explorer.app.features.paths.state import Stop
 from explorer.app.server import Running, start
 from explorer.app.session.session import move_to
+from explorer.app.state.actions import Set
 from explorer.app.state.moves import set_position
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
@@ -116,6 +118,22 @@ def test_file_that_cannot_be_drawn_is_refused_to_the_tab_that_asks_alone(tmp_pat
         running.page.services.downloads.make(client.client_id, "Drawing", refuse)
         assert notices_until(client, "too large")[-1]["body"] == "the scene is too large"
         assert "too large" not in str(other.read_all_sent(running))
+
+
+def test_same_refusal_is_told_to_each_browser_that_meets_it_and_once_while_it_stays(
+    tmp_path: Path,
+) -> None:
+    with (
+        explorer_with(data_in(tmp_path)) as running,
+        client_of(running) as one,
+        client_of(running) as other,
+    ):
+        session = running.page.session
+        for client in (one, other, one):
+            session.do(lambda _: Set("paths.stops", (Stop(pause=-5.0),)), who=client.client_id)
+        session.do(Set("paths.duration", 0.0), who=one.client_id)
+        refusals = [notices_until(one, "a path needs a time"), notices_until(other, "got -5 s")]
+        assert [[n["body"].count("got -5 s") for n in each] for each in refusals] == [[1, 0], [1]]
 
 
 def encoded(what: str) -> bytes:
