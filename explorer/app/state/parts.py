@@ -187,24 +187,19 @@ def with_value(whole: Whole, path: str, value: object) -> Whole:
     return replace(part, **{name: new})
 
 
-def take_back(before: Whole, after: Whole, now: Whole) -> Whole:
-    """Return a frozen value without a change that led from one value to another.
-
-    Each part that has the value which the change gave it has the one before the change again; what
-    was changed since stays.
+def with_change(whole: Whole, before: Whole, after: Whole) -> Whole:
+    """Return a frozen value with each part that differs between two values as the second has it.
 
     Raises:
         InputError: A part refuses the value.
     """
-    if now == after:
-        return before
-    if not _names_of(before) == _names_of(after) == _names_of(now):
-        return now
-    for name in _names_of(now):
+    if whole == before or not _names_of(before) == _names_of(after) == _names_of(whole) != ():
+        return after
+    for name in _names_of(whole):
         old, new = value_at(before, name), value_at(after, name)
         if old != new:
-            now = with_value(now, name, take_back(old, new, value_at(now, name)))
-    return now
+            whole = with_value(whole, name, with_change(value_at(whole, name), old, new))
+    return whole
 
 
 def _names_of(value: Any) -> tuple[str, ...]:

@@ -2,13 +2,14 @@
 
 A step turns to its tab and rings its control. In the end, and wherever a course is left, what it
 has changed is taken back, in one step of the history, so that nothing is lost. What people have
-changed meanwhile, in this browser or another, stays.
+changed meanwhile, in this browser or another, stays: a card keeps the state as it would be if its
+course had set nothing, to which all that others do is carried over.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from html import escape
@@ -25,13 +26,13 @@ from explorer.app.features.help.lessons import (
     list_courses,
     title_words,
 )
-from explorer.app.features.optimise.actions import cancel_run, revert
+from explorer.app.features.optimise.actions import cancel_run, restore_own
 from explorer.app.features.optimise.state import Optimisation, SearchRun
 from explorer.app.features.paths.state import Paths
 from explorer.app.state.actions import Act, action
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import move_to
-from explorer.app.state.parts import take_back, with_value
+from explorer.app.state.parts import with_change, with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
 from explorer.export.drawings.markup import as_html
@@ -43,6 +44,7 @@ from explorer.page.look import call_script, read_script
 PRESS, OFFER = "tour", "offer"
 BUSY = "the tour changes the design: let the search end first, or cancel it"
 OVER = "What the steps changed is taken back, and what you changed stays. Undo shows it again."
+BEYOND = "Show me cannot do this step with this design. {}."
 STAYS = "The design that the tour opened stays, since it was changed. Undo and History have yours."
 BUTTONS = {
     "Leave": "Take back what the steps have changed; Help and the search begin them again.",
@@ -64,61 +66,45 @@ def _result(frame: Frame) -> Iterator[str]:
     yield f"The volume grew from {then} to <b>{now} {unit.name}</b>; the paper asks for {wanted}."
 
 
-Change = tuple[State, State]
-"""The states before and after an action of the tour."""
-
-
 @action(title_words)
-def end_course(state: State, title: str, changes: tuple[Change, ...]) -> State:
-    """Take back what a course has changed, with the search from a design that it opened.
+def end_course(state: State, title: str, own: State) -> State:
+    """Show the state as it would be if a course had set nothing.
 
     The action is refused while a design is being optimised.
     """
     del title
-    after, run = state, own_search(state, changes)
-    if run is not None and not run.accepted:
-        after = with_value(revert().apply(state), "optimisation.run", None)
-    for change in reversed(changes):
-        after = _take_back(change, after)
-    return replace(after.for_step().restore_over(state), view=after.view)
+    return replace(own.restore_over(state), view=own.view)
 
 
-def own_search(state: State, changes: Sequence[Change]) -> SearchRun | None:
-    """Return the last search if it began at a design that the tour has opened; else None."""
-    run = Optimisation.of(state).run
-    is_own = run is not None and any(
-        before.base != after.base
-        and run.own.design == after.design
-        and run.number > Optimisation.of(after).count
-        for before, after in changes
-    )
-    return run if is_own else None
-
-
-def _take_back(change: Change, state: State) -> State:
-    """Return a state without one change; a design that it opened stays once it was changed."""
-    before, after = change
-    old, own, now = (Paths.of(each).journey for each in (before, after, state))
-    if own is not None and now is not None and own not in (old, now) and own.poses == now.poses:
-        # The path that the change made was played since.
-        played = move_to(with_value(after, "paths.journey", now), now.pose)
-        state = _take_back((after, played), state)
-    if before.base != after.base and state.design != after.design:
-        return state
-    whole = take_back(before, after, state)
-    if (state.design, state.pose, state.joints) == (after.design, after.pose, after.joints):
+def carry_over(own: State, before: State, now: State) -> State:
+    """Return a state with what others changed between two states in which a course has a part."""
+    lasts, journey = Paths.of(before).journey, Paths.of(now).journey
+    if lasts is not None and journey is not None and lasts.poses == journey.poses:
+        mine = Paths.of(own).journey
+        if now.pose == journey.pose and (mine is None or mine.poses != journey.poses):
+            # The path that the course made was played.
+            before = move_to(with_value(before, "paths.journey", journey), journey.pose)
+    whole = with_change(own, before, now)
+    if before.design != now.design and not own.base == before.base == now.base:
+        # A design that was opened stays, and so does one of the course once it was changed.
+        return now.with_view_of(whole)
+    platform = before.design, before.pose, before.joints
+    if platform in ((own.design, own.pose, own.joints), (now.design, now.pose, now.joints)):
         return whole
     # Angles belong to the quaternion, and joints to the pose and the design.
-    turned = before if state.pose.quaternion == after.pose.quaternion else state
+    turned = own if before.pose.quaternion == now.pose.quaternion else now
     pose = Pose(whole.pose.position, turned.pose.quaternion)
     return move_to(replace(whole, pose=pose), pose, turned.yaw_pitch_roll)
 
 
 @dataclass
 class Card:
-    """The course of one browser: its step, whether it is done, and what the course has changed.
+    """The course of one browser, its step, and whether it is done.
 
-    The step began in the frame `start`.
+    Attributes:
+        start: The frame in which the step began.
+        own: The state as it would be if the course had set nothing.
+        opened: The state in which the course opened a design; None if it has opened none.
     """
 
     client: viser.ClientHandle
@@ -126,8 +112,40 @@ class Card:
     at: int
     start: Frame
     is_done: bool = False
-    changes: list[Change] = field(default_factory=list[Change])
+    own: State = field(init=False)
+    opened: State | None = None
+    _seen: State = field(init=False)
     _shown: str = ""
+
+    def __post_init__(self) -> None:
+        self.own = self._seen = self.start.state
+
+    def observe(self, state: State) -> None:
+        """Carry over to `own` what others have done since the last state."""
+        now = self._without_search(state)
+        self.own, self._seen = carry_over(self.own, self._seen, now), now
+
+    def make(self, act: Act, state: State) -> State:
+        """Return the state after an action of the course on a state."""
+        self.observe(state)
+        after = act.apply(state)
+        if after.base != state.base:
+            self.opened = after
+        self._seen = self._without_search(after)
+        return after
+
+    def own_search(self, state: State) -> SearchRun | None:
+        """Return the last search if it began at a design that the course has opened; else None."""
+        run, opened = Optimisation.of(state).run, self.opened
+        if run is None or opened is None or run.own.design != opened.design:
+            return None
+        return run if run.number > Optimisation.of(opened).count else None
+
+    def _without_search(self, state: State) -> State:
+        run = self.own_search(state)
+        if run is None or run.accepted:
+            return state
+        return with_value(restore_own(state, run.own), "optimisation.run", None)
 
     @property
     def step(self) -> Step:
@@ -207,7 +225,10 @@ class CourseGuide(Runner):
     def follow(self, frame: Frame) -> None:
         """Mark the steps that a frame shows as done, and end the courses that are over."""
         with self._lock:
+            for card in self._ended:
+                card.observe(frame.state)
             for card in tuple(self.cards.values()):
+                card.observe(frame.state)
                 card.follow(frame)
             if not frame.state.busy:
                 ended, self._ended = self._ended, []
@@ -216,18 +237,14 @@ class CourseGuide(Runner):
 
     def _take_back(self, card: Card, state: State) -> Act | None:
         """Return the action that takes back what a course has changed; None if nothing is left."""
-        if not card.changes:
-            return None
-        course = card.course
-        title = f"Leave the lesson {course.title}" if course.is_lesson else "End the tour"
-        end = end_course(title, tuple(card.changes))
-        after = end.apply(state)
-        opened = [before.base for before, shown in card.changes if before.base != shown.base]
-        if opened and after.base != opened[0]:
+        card.observe(state)
+        course, own = card.course, card.own
+        if card.opened is not None and own.base == card.opened.base:
             self._services.tell(STAYS, card.client.client_id)
-        elif (after.design, after.pose) != (state.design, state.pose):
+        elif (own.design, own.pose) != (state.design, state.pose):
             self._services.tell(OVER, card.client.client_id)
-        return end
+        title = f"Leave the lesson {course.title}" if course.is_lesson else "End the tour"
+        return None if own == state else end_course(title, own)
 
     def _end(self, who: int) -> None:
         """End the course of a browser; a search from a design that it opened is cancelled first."""
@@ -237,19 +254,28 @@ class CourseGuide(Runner):
                 card.close()
                 self._ended.append(card)
                 self._session.do(
-                    lambda state: cancel_run() if own_search(state, card.changes) else None, who=who
+                    lambda state: cancel_run() if card.own_search(state) else None, who=who
                 )
 
     def _set(self, card: Card, settings: tuple[Relation, ...]) -> None:
-        """Make settings of a step, if there are any, and note what they change."""
+        """Make settings of a step, if there are any."""
         act = arrange(card.step.title, settings)
 
         def change(state: State) -> Act:
-            card.changes.append((state, act.apply(state)))
+            card.make(act, state)
             return act
 
         if settings:
             self._session.do(change, who=card.client.client_id)
+
+    def _show(self, card: Card, state: State) -> Act:
+        """Return the action that does the step of a card; tell what it cannot reach."""
+        act = card.step.solve(state, card.start)
+        after = card.make(act, state)
+        lacking = () if after.busy else card.step.lacking(Frame(after), card.start)
+        if lacking:
+            self._services.tell(BEYOND.format(". ".join(lacking)), card.client.client_id)
+        return act
 
     def _press(self, name: str, client: viser.ClientHandle) -> None:
         card = self.cards.get(client.client_id)
@@ -260,7 +286,7 @@ class CourseGuide(Runner):
             return
         is_on = name in ("Next", "Skip")
         if name == "Show me":
-            self._set(card, card.step.shown)
+            self._session.do(partial(self._show, card), who=client.client_id)
         elif name == "Leave" or (is_on and card.is_last):
             self._end(client.client_id)
         else:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterator
+from contextlib import suppress
 from xml.etree.ElementTree import Element
 
 from explorer.app.features.help.lessons import Course, Step, arrange
 from explorer.app.features.paths.state import journey_of
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
+from explorer.errors import ExplorerError
 from explorer.export.drawings.figure import figure_svg
 from explorer.export.drawings.markup import element, illustration, paragraph
 from explorer.export.drawings.mechanism import fit_view, points_to_show
@@ -23,8 +25,7 @@ WIDTH = 66.0
 def handout_html(course: Course, present: State) -> str:
     """Return a lesson on the design of a state, in the unit of its view, to be printed.
 
-    Raises:
-        InputError: The design cannot do a step.
+    A step that the design cannot do says so.
     """
     state = open_state(present.design, view=present.view)
     about = element("p", f"Lesson on {state.design.name}", class_="kind")
@@ -40,7 +41,9 @@ def handout_html(course: Course, present: State) -> str:
 def solve(course: Course, state: State) -> Iterator[tuple[Step, Frame]]:
     """Yield each step of a course with the frame in which "Show me" has done it."""
     for step in course.steps:
-        state = arrange(step.title, (*step.first, *step.shown)).apply(state)
+        begun = Frame(arrange(step.title, step.first).apply(state))
+        with suppress(ExplorerError):
+            state = step.solve(begun.state, begun).apply(begun.state)
         yield step, Frame(state)
 
 
@@ -54,5 +57,7 @@ def _picture(step: Step, frame: Frame) -> Element:
     view = fit_view("isometric", points_to_show(snapshot), (0.0, 0.0, 1.0, 1.0))
     svg = b64encode(figure_svg(snapshot, view, WIDTH)).decode()
     words = ". ".join((f"{words[:1].upper()}{words[1:]}", *step.readings(frame, frame)))
+    if step.lacking(frame, frame):
+        words += ". This design cannot do the step"
     image = element("img", src=f"data:image/svg+xml;base64,{svg}", alt=words)
     return illustration(image, f"{words}.")

@@ -6,8 +6,8 @@ A course has a title and a sentence. Each of its steps has a title, instructions
     tab         the tab of the controls that the step is about
     control     the control that is ringed: the name of a slider, or the press of a button
     first       a setting that is made when the step begins, such as "tetrahedra = on"
-    asked       a condition, such as "smallest margin < 2 mm"
-    shown       a setting that "Show me" makes, such as "δ3 = 1 mm"
+    asked       a condition, such as "smallest margin < 1 % of the reach"
+    shown       a setting that "Show me" makes, such as "δ3 = 0.5 % of the reach"
     then        a setting that is made when the user goes on
 
 Conditions and settings speak of the values of `explorer.app.features.help.values`.
@@ -18,19 +18,21 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 from xml.etree.ElementTree import Element
 
 from explorer.app.features.help.values import VALUES
-from explorer.app.state.actions import action
+from explorer.app.state.actions import Act, action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.errors import InputError
+from explorer.errors import ExplorerError, InputError
 from explorer.export.drawings.markup import element, paragraph
 from explorer.files.packaged import packaged_files
-from explorer.numerics.number_text import Unit
+from explorer.measures.verdict import TITLES
+from explorer.numerics.number_text import format_number
 
 TOUR = "tour.md"
 """The file of the tour; the others are lessons."""
@@ -48,12 +50,13 @@ SIGNS = {
     "≠": ("not ", operator.ne),
 }
 LINE, RELATION = re.compile(r"- (\w+): +(.*)"), re.compile(r"(.+?) ([<>=≠]) (.+)")
-NUMBER, LENGTH = (re.compile(rf"(\d+(?:\.\d+)?){unit}") for unit in ("", " mm"))
+OF_REACH = " % of the reach"
+NUMBER, LENGTH = (re.compile(rf"(\d+(?:\.\d+)?){unit}") for unit in ("", OF_REACH))
 
 
 @dataclass(frozen=True)
 class Relation:
-    """A condition on a named value, or a setting of it; a bound of length is in mm."""
+    """A condition on a named value, or a setting of it; a length is bounded in % of the reach."""
 
     name: str
     sign: str
@@ -65,12 +68,13 @@ class Relation:
         return value is not None and SIGNS[self.sign][1](value, self.bound)
 
     def reading(self, now: Frame, start: Frame) -> str:
-        """Return what there is and what is asked, such as "δ2: 14.3 mm; asked: below 2 mm"."""
-        state, of = now.state, VALUES[self.name]
-        unit, size = (state.unit, state.design.unit_mm) if of.is_length else (Unit(""), 1.0)
+        """Return what there is and is asked, such as "δ2: 7 % of the reach; asked: below 1 %"."""
+        of = VALUES[self.name]
         there, bound = (
-            unit.text(value / size, 3) if isinstance(value, float) else value or "undetermined"
-            for value in (of.read(now, start), self.bound)
+            f"{format_number(value, 3)}{unit if of.is_length else ''}"
+            if isinstance(value, float)
+            else value or "undetermined"
+            for value, unit in ((of.read(now, start), OF_REACH), (self.bound, " %"))
         )
         name = f"{self.name[:1].upper()}{self.name[1:]}" if self.name.isascii() else self.name
         return f"{name}: {there}; asked: {SIGNS[self.sign][0]}{bound}"
@@ -86,9 +90,12 @@ def arrange(state: State, title: str, settings: tuple[Relation, ...]) -> State:
     """Make settings of the step with a title, one after the other; errors are those of each."""
     del title
     for each in settings:
-        change = VALUES[each.name].set
-        state = state if change is None else change(state, each.bound)
+        state = VALUES[each.name].set(state, each.bound)
     return state
+
+
+HOME = (Relation("verdict", "=", TITLES["clear"]),)
+"""The setting that moves the platform home."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +126,25 @@ class Step:
 
     def is_done(self, now: Frame, start: Frame) -> bool:
         """Whether a frame has what the step asks for, if it began in another."""
-        return all(each.holds(now, start) for each in self.asked)
+        return not self.lacking(now, start)
+
+    def lacking(self, now: Frame, start: Frame) -> list[str]:
+        """Return what a frame has of each thing that it lacks of what the step asks for."""
+        return [each.reading(now, start) for each in self.asked if not each.holds(now, start)]
+
+    def solve(self, state: State, start: Frame) -> Act:
+        """Return the action that does the step: from a state, or from home if it cannot from there.
+
+        Where neither does it, the action is the one from the state, whose errors may tell why.
+        """
+        here, from_home = (arrange(self.title, (*way, *self.shown)) for way in ((), HOME))
+        for act in (here, from_home):
+            with suppress(ExplorerError):
+                after = act.apply(state)
+                # A search takes its time.
+                if after.busy or self.is_done(Frame(after), start):
+                    return act
+        return here
 
     def readings(self, now: Frame, start: Frame) -> list[str]:
         """Return what a frame has of each thing that the step asks for."""
@@ -201,8 +226,7 @@ def _parse(key: str, value: str) -> str | Relation:
     if found is None:
         raise InputError(f"{value!r} is not NAME < NUMBER, NAME > NUMBER or NAME = VALUE")
     (name, sign, bound), is_setting = found.groups(), key != "asked"
-    what = "what can be set" if is_setting else "the values"
-    _check(what, name, [each for each, of in VALUES.items() if of.set or not is_setting])
+    _check("the values", name, [*VALUES])
     options, is_length = VALUES[name].options, VALUES[name].is_length
     _check(f"the signs of {name}", sign, "=" if is_setting else "=≠" if options else "<>=")
     if options:
@@ -210,7 +234,7 @@ def _parse(key: str, value: str) -> str | Relation:
         return Relation(name, sign, bound)
     number = (LENGTH if is_length else NUMBER).fullmatch(bound)
     if number is None:
-        takes = "a length such as 2 mm" if is_length else "a number"
+        takes = f"a length such as 1{OF_REACH}" if is_length else "a number"
         raise InputError(f"{name!r} takes {takes}; got {bound!r}")
     return Relation(name, sign, float(number[1]))
 

@@ -24,11 +24,13 @@ from explorer.app.state.state import State
 from explorer.measures.verdict import TITLES
 from explorer.mechanism.machine import Payload
 from explorer.mechanism.margins import TETRAHEDRA
+from explorer.singularity.colours import WARN_SHARE
 from explorer.statics.loaded import LoadedPose
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
 # warning lengths, the factor on a variable, and that on the margin to be the smallest.
 STRIDE, NEAR, GROWTH, FLATTER = 0.1, 0.5, 1.1, 0.5
+MOST_HALVINGS = 40
 FLAT = tuple(map(" ".join, TETRAHEDRA))
 
 
@@ -37,15 +39,15 @@ class Named:
     """A value of the state.
 
     Attributes:
-        read: Function of the present frame and of that in which a step began that returns it, in mm
-            if it is a length, or the word of a choice; None where it has none.
-        set: Function from a state to one with another value; None if it cannot be set.
+        read: Function of the present frame and of that in which a step began that returns it, in
+            % of the reach if it is a length, or the word of a choice; None where it has none.
+        set: Function from a state to one with another value.
         options: The words of a choice; () for a number.
         is_length: Whether it is a length.
     """
 
     read: Callable[[Frame, Frame], float | str | None]
-    set: Callable[[State, Any], State] | None = None
+    set: Callable[[State, Any], State]
     options: tuple[str, ...] = ()
     is_length: bool = False
 
@@ -72,8 +74,8 @@ def _event(
 
 
 def _sizes(frame: Frame) -> list[float]:
-    """Return |δ1|, |δ2| and |δ3|, in mm."""
-    return (frame.state.design.unit_mm * np.abs(frame.snapshot.margins)).tolist()
+    """Return |δ1|, |δ2| and |δ3|, in % of the reach."""
+    return (100.0 / frame.state.design.reach * np.abs(frame.snapshot.margins)).tolist()
 
 
 def _flattest(frame: Frame) -> int:
@@ -90,10 +92,10 @@ def _margin(which: Callable[[Frame], int]) -> Named:
 
 
 def _flatten(state: State, index: int, size: float) -> State:
-    """Return a state with |δ| of an index of a size in mm, or the largest, by its fold alone."""
+    """Return a state with |δ| of an index of a size in %, or the largest, by its fold alone."""
     r, beta, epsilon, *folds = folds_of(state)
     sines = math.sin(math.radians(beta)), math.sin(math.radians(epsilon))
-    largest = state.design.unit_mm * r * (sines[1], sines[0] * sines[1], sines[0])[index]
+    largest = 100.0 / state.design.reach * r * (sines[1], sines[0] * sines[1], sines[0])[index]
     angle = math.degrees(math.asin(size / largest)) if size < largest else 0.5 * HALF_TURN
     if abs(folds[index]) > 0.5 * HALF_TURN:
         angle = HALF_TURN - angle
@@ -107,12 +109,15 @@ def _make_flattest(state: State, name: str) -> State:
 
 def _to_verdict(state: State, title: str) -> State:
     if title == TITLES["clear"]:
-        return go_home().apply(state)
+        home = go_home().apply(state)
+        is_clear = Frame(home).verdict.kind == "clear"
+        return home if is_clear else with_value(home, "view.warn_below", None)
     if title == TITLES["singular"]:
         is_there = Frame(state).snapshot.is_singular
         return state if is_there else go_to_singularity(None).apply(state)
     # Lower b4 towards the base plane: δ3 is its height.
-    height = math.copysign(NEAR * state.warn_below, state.pose.position[2])
+    warned = min(state.warn_below, WARN_SHARE * state.design.reach)
+    height = math.copysign(NEAR * warned, state.pose.position[2])
     return set_position(2, height + float(state.offset(state.pose.rotation)[2])).apply(state)
 
 
@@ -120,6 +125,17 @@ def _amplification(now: Frame, _: Frame) -> float:
     """Return one over the smallest singular value of J with lengths over the reach."""
     least = float(now.snapshot.smallest_singular_value)
     return 1.0 / least if least > 0.0 else math.inf
+
+
+def _set_amplification(state: State, bound: float) -> State:
+    """Return a state with an amplification of at least a bound, by the smallest margin alone."""
+    for _ in range(MOST_HALVINGS):
+        frame = Frame(state)
+        if _amplification(frame, frame) >= bound:
+            break
+        index = _flattest(frame)
+        state = _flatten(state, index, 0.5 * _sizes(frame)[index])
+    return state
 
 
 def _load(now: Frame, _: Frame) -> str:
@@ -183,7 +199,7 @@ VALUES: dict[str, Named] = {
     "smallest margin": _margin(_flattest),
     "flattest tetrahedron": Named(lambda now, _: FLAT[_flattest(now)], _make_flattest, FLAT),
     "verdict": Named(lambda now, _: now.verdict.title, _to_verdict, (*TITLES.values(),)),
-    "amplification": Named(_amplification),
+    "amplification": Named(_amplification, _set_amplification),
     "load": Named(_load, _set_load, ("held", "not held")),
     "mode": Named(
         lambda now, _: None if now.snapshot.is_singular else str(now.state.mode),

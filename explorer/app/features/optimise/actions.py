@@ -135,7 +135,7 @@ def end_run(
         return state
     after = with_value(state, "optimisation.run", replace(run, phase="ended", verdict=verdict))
     if verdict.best is None:
-        return _restore_own(after, run.own)
+        return restore_own(after, run.own)
     return _with_design(after, _rename(verdict.best.design))
 
 
@@ -160,7 +160,7 @@ def revert(state: State) -> State:
     """Return to the user's own design in its pose, exactly."""
     run = Optimisation.of(state).undecided
     return (
-        state if run is None else _restore_own(with_value(state, "optimisation.run", None), run.own)
+        state if run is None else restore_own(with_value(state, "optimisation.run", None), run.own)
     )
 
 
@@ -170,8 +170,8 @@ def _running(state: State, number: int) -> SearchRun | None:
     return run if run is not None and run.number == number and run.phase != "ended" else None
 
 
-def _restore_own(state: State, own: State) -> State:
-    """Return the user's own state with the present view."""
+def restore_own(state: State, own: State) -> State:
+    """Return the user's own state, that before a run, with the present view."""
     present = state.in_unit_of(own.design)
     # A path belongs to the design that it was made for.
     parts = {**present.parts, "paths": own.parts["paths"]}
