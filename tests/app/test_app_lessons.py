@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation, Slerp
-from tour_desk import BROWSER, ONE, TourDesk
+from tour_desk import BROWSER, ONE, OTHER, TourDesk
 
 from explorer.app.features.help.guide import Card, card_words
 from explorer.app.features.help.handout import handout_html, solve
@@ -25,6 +25,7 @@ from explorer.app.features.help.lessons import (
     TABS,
     TOUR,
     Course,
+    Step,
     arrange,
     list_courses,
     parse_course,
@@ -32,11 +33,13 @@ from explorer.app.features.help.lessons import (
 from explorer.app.features.help.search import SearchDialog
 from explorer.app.features.optimise.actions import start_run
 from explorer.app.features.paths.actions import advance_journey, go, play
-from explorer.app.features.paths.state import Paths, Stop
+from explorer.app.features.paths.state import Paths, Stop, is_playing
+from explorer.app.features.singularity.work import go_to_singularity
 from explorer.app.server import Running
-from explorer.app.state.actions import Action, Set
+from explorer.app.session.session import UNDO
+from explorer.app.state.actions import Action, Set, open_design
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import set_mode, set_position
+from explorer.app.state.moves import set_mode, set_pose, set_position
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.errors import InputError
@@ -260,6 +263,61 @@ def test_wrong_state_passes_no_step(lesson: Course) -> None:
     assert passed.sum() >= CASES // 5
 
 
+SCALES = st.sampled_from((0.005, 1.0, 300.0))
+
+
+@settings(max_examples=80)
+@given(
+    st.sampled_from([(lesson, step) for lesson in LESSONS for step in lesson.steps]),
+    st.integers(0, 2**32 - 1),
+    SCALES,
+    st.sampled_from((None, 0.001, 1.0)),
+)
+def test_show_me_does_each_step_from_any_state_of_a_design_of_any_size(
+    of: tuple[Course, Step], seed: int, scale: float, warned: float | None
+) -> None:
+    state, (_, step) = random_state(np.random.default_rng(seed)), of
+    design = state.design.with_variables([scale * each for each in state.design.variables])
+    position = np.multiply(state.pose.position, scale)
+    state = open_state(design, Pose.of(position, state.pose.rotation))
+    if warned is not None:
+        # The largest is longer than any margin of the home pose.
+        state = with_value(state, "view.warn_below", warned * state.design.reach)
+    start = Frame(arrange("", step.first).apply(state))
+    after = step.solve(start.state, start).apply(start.state)
+    home = open_state(design)
+    if step.title != "Go where it is safe" or CONDITIONS[step.title](home):
+        assert step.is_done(Frame(after), start), step.lacking(Frame(after), start)
+        assert CONDITIONS[step.title](after)
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.title)
+def test_show_me_does_each_step_from_a_singular_pose(lesson: Course, index: int) -> None:
+    state = go_to_singularity(index + 1).apply(open_state(PRESETS["paper-optimal"]))
+    for at, step in enumerate(lesson.steps):
+        desk = TourDesk()
+        desk.do(set_pose(state.pose), ONE)
+        desk.begin("Show me", file=lesson.file, at=at)
+        assert CONDITIONS[step.title](desk.state), step.title
+        assert desk.complaints == desk.told == []
+
+
+def test_step_that_a_design_cannot_do_is_told_with_what_is_lacking() -> None:
+    # Base and platform are nearly lines, so that home has a large amplification.
+    design = PRESETS["paper-optimal"].with_variables((7.0, 0.002, 3.0, 0.002, 2.0, 4.0))
+    state = open_state(design)
+    start, step = Frame(state), SINGULAR.steps[-1]
+    after = Frame(step.solve(state, start).apply(state))
+    lacking = ". ".join(step.lacking(after, start))
+    assert lacking
+    desk = TourDesk()
+    desk.do(open_design(design))
+    desk.begin("Show me", file=SINGULAR.file, at=len(SINGULAR.steps) - 1)
+    assert [(lacking in message, who) for message, who in desk.told] == [(True, ONE)]
+    assert f"{lacking}. This design cannot do the step." in handout_html(SINGULAR, state)
+
+
 DAMAGED = {
     "": (1, "# TITLE"),
     "# A\n\nText.": (1, "## TITLE"),
@@ -303,6 +361,10 @@ OF_USERS = st.one_of(
     st.builds(advance_journey, st.sampled_from((0.5, 2.0, 20.0))),
 )
 PRESSES = st.sampled_from(("Show me", "Show me", "Next", "Skip", "Skip", "Back"))
+OF_MOVES = st.one_of(
+    st.builds(set_position, st.integers(0, 2), st.sampled_from((3.25, 4.5, 6.75))),
+    st.builds(Set, st.sampled_from(("view.grid", "view.ghosts")), st.booleans()),
+)
 
 
 @settings(max_examples=60)
@@ -337,6 +399,71 @@ def test_lesson_leaves_what_users_did_as_if_there_had_been_none(
     assert left.pose.quaternion == pytest.approx(expected.pose.quaternion, abs=1e-15)
     np.testing.assert_allclose(left.joints, expected.joints, rtol=1e-12)
     assert left.mode == expected.mode
+
+
+@settings(max_examples=100)
+@given(
+    st.lists(
+        st.sampled_from([(lesson, at) for lesson in LESSONS for at in range(len(lesson.steps))]),
+        min_size=2,
+        max_size=2,
+    ),
+    st.lists(st.sampled_from((ONE, OTHER)) | OF_MOVES, max_size=8),
+    st.permutations((ONE, OTHER)),
+)
+def test_lessons_of_two_browsers_leave_what_was_done_by_hand(
+    steps: list[tuple[Course, int]], events: list[int | Action], order: list[int]
+) -> None:
+    desk, started = TourDesk(), set[int]()
+    expected = desk.state
+    for event in events:
+        if isinstance(event, int):
+            if event not in started:
+                lesson, at = steps[event - ONE]
+                desk.begin(file=lesson.file, at=at, who=event)
+            started.add(event)
+            desk.tour("Show me", event)
+        # What is set to the value that it has already is no change.
+        elif desk.state != desk.do(event):
+            expected = event.apply(expected)
+    for who in order:
+        desk.tour("Leave", who)
+    assert desk.state.view == expected.view
+    assert desk.state.pose.position == pytest.approx(expected.pose.position, abs=1e-12)
+    assert desk.state.pose.quaternion == pytest.approx(expected.pose.quaternion, abs=1e-15)
+
+
+def test_lesson_leaves_the_mode_that_was_undone_and_chosen_by_hand() -> None:
+    desk = TourDesk()
+    desk.begin("Show me", file=MODES.file, at=1)
+    desk.session.do(UNDO, who=ONE)
+    expected = desk.do(set_mode(5), ONE)
+    desk.tour("Leave")
+    assert (desk.state.pose, desk.state.mode) == (expected.pose, 5)
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.title)
+def test_lesson_leaves_a_path_that_the_user_plays_as_it_is(lesson: Course) -> None:
+    desk = TourDesk()
+    desk.do(Set("paths.stops", (Stop(), Stop(4))), ONE)
+    desk.do(go(), ONE)
+    desk.begin("Show me", file=lesson.file)
+    desk.do(advance_journey(1.0), ONE)
+    before = Paths.of(desk.state)
+    desk.tour("Leave")
+    assert Paths.of(desk.state) == before
+    assert is_playing(desk.state)
+
+
+def test_lesson_takes_back_a_path_of_its_own_that_was_cleared_half_way() -> None:
+    desk = TourDesk()
+    first = desk.state
+    desk.begin("Show me", file=MODES.file, at=2)
+    desk.do(advance_journey(4.0), ONE)
+    desk.do(Set("paths", Paths()), ONE)
+    assert desk.state.pose != first.pose
+    desk.tour("Leave")
+    assert desk.state.pose == first.pose
 
 
 def test_lesson_during_a_search_begins_and_is_taken_back_after_it() -> None:

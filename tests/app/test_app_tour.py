@@ -36,7 +36,9 @@ def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design
     card = Card(BROWSER, tour, 0, Frame(state))
 
     def apply(settings: tuple[Relation, ...]) -> State:
-        return card.make(arrange("", settings), state)
+        after = arrange("", settings).apply(state)
+        card.observe(after, card)
+        return after
 
     card.turn(-1, Frame(state))
     for index, step in enumerate(tour.steps):

@@ -29,7 +29,9 @@ class TourDesk(Desk):
 
     def __init__(self) -> None:
         self.told: list[tuple[str, int | None]] = []
-        self._client: Any = SimpleNamespace(client_id=ONE, _websock_connection=self)
+        self._clients: dict[int, Any] = {
+            who: SimpleNamespace(client_id=who, _websock_connection=self) for who in (ONE, OTHER)
+        }
         self._press: Callable[[str, Any], None]
         self._leave: Callable[[Any], None]
         self._guide: CourseGuide | None = None
@@ -48,12 +50,12 @@ class TourDesk(Desk):
         if self._guide is not None:
             self._guide.follow(frame)
 
-    def begin(self, *presses: str, file: str = TOUR, at: int = 0) -> None:
+    def begin(self, *presses: str, file: str = TOUR, at: int = 0, who: int = ONE) -> None:
         """Begin the tour, or a lesson, at a step, and press buttons of its card."""
         assert self._guide is not None
-        self._guide.begin(self._client, file, at)
+        self._guide.begin(self._clients[who], file, at)
         for name in presses:
-            self.tour(name)
+            self.tour(name, who)
 
     @property
     def card(self) -> Card:
@@ -63,11 +65,11 @@ class TourDesk(Desk):
 
     def leave(self) -> None:
         """Close or reload the browser with the tour."""
-        self._leave(self._client)
+        self._leave(self._clients[ONE])
 
-    def tour(self, name: str) -> None:
-        """Press a button of the card."""
-        self._press(name, self._client)
+    def tour(self, name: str, who: int = ONE) -> None:
+        """Press a button of the card of a browser."""
+        self._press(name, self._clients[who])
         assert self.session.wait_until_idle()
 
     def do(self, action: Action, who: int = OTHER) -> State:

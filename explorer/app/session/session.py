@@ -91,6 +91,7 @@ class Session:
         self._press_at = press_at
         self._tell = tell
         self._words_of = words_of
+        self._watchers: list[Callable[[State], None]] = []
         self._jobs: LatestWins[_Posted] = LatestWins(self._handle, "session")
 
     @property
@@ -102,6 +103,10 @@ class Session:
     def history(self) -> History:
         """The history so far."""
         return self._history
+
+    def watch(self, see: Callable[[State], None]) -> None:
+        """Call a function with each new state, on the session's thread; not all are drawn."""
+        self._watchers.append(see)
 
     def post(
         self,
@@ -192,3 +197,5 @@ class Session:
         # The history first: a thread that sees the new state finds its step.
         self._history = history
         self._state = state
+        for see in self._watchers:
+            see(state)

@@ -79,7 +79,7 @@ def end_course(state: State, title: str, own: State) -> State:
 def carry_over(own: State, before: State, now: State) -> State:
     """Return a state with what others changed between two states in which a course has a part."""
     lasts, journey = Paths.of(before).journey, Paths.of(now).journey
-    if lasts is not None and journey is not None and lasts.poses == journey.poses:
+    if lasts is not None and journey not in (None, lasts) and lasts.poses == journey.poses:
         mine = Paths.of(own).journey
         if now.pose == journey.pose and (mine is None or mine.poses != journey.poses):
             # The path that the course made was played.
@@ -104,6 +104,7 @@ class Card:
     Attributes:
         start: The frame in which the step began.
         own: The state as it would be if the course had set nothing.
+        plain: The state as it would be if no course of any browser had set anything.
         opened: The state in which the course opened a design; None if it has opened none.
     """
 
@@ -113,26 +114,27 @@ class Card:
     start: Frame
     is_done: bool = False
     own: State = field(init=False)
+    plain: State = field(init=False)
     opened: State | None = None
     _seen: State = field(init=False)
     _shown: str = ""
 
     def __post_init__(self) -> None:
-        self.own = self._seen = self.start.state
+        self.own = self.plain = self._seen = self.start.state
 
-    def observe(self, state: State) -> None:
-        """Carry over to `own` what others have done since the last state."""
-        now = self._without_search(state)
-        self.own, self._seen = carry_over(self.own, self._seen, now), now
+    def observe(self, state: State, maker: Card | None = None) -> None:
+        """Take in the next state, which the course of a card made; None for a user."""
+        if maker is self and state.base != self._seen.base:
+            self.opened = state
+        before, self._seen = self._seen, self._without_search(state)
+        if maker is not self:
+            self.own = carry_over(self.own, before, self._seen)
+        if maker is None:
+            self.plain = carry_over(self.plain, before, self._seen)
 
-    def make(self, act: Act, state: State) -> State:
-        """Return the state after an action of the course on a state."""
-        self.observe(state)
-        after = act.apply(state)
-        if after.base != state.base:
-            self.opened = after
-        self._seen = self._without_search(after)
-        return after
+    def forget(self, state: State) -> None:
+        """Take in a state in which what the course of another card had set is taken back."""
+        self.own, self._seen = self.plain, self._without_search(state)
 
     def own_search(self, state: State) -> SearchRun | None:
         """Return the last search if it began at a design that the course has opened; else None."""
@@ -203,6 +205,7 @@ class CourseGuide(Runner):
         # Courses that have ended, until what they have changed is taken back.
         self._ended: list[Card] = []
         self.courses = list_courses()
+        self._session.watch(self._observe)
         services.buttons.on(PRESS, self._press, values=(OFFER, *BUTTONS))
         if services.offers_tour:
             offer = f"{read_script('tour')}window.explorer.tour.offer();"
@@ -218,22 +221,29 @@ class CourseGuide(Runner):
             self._services.complain(BUSY, client.client_id)
             return
         with self._lock:
-            card = self.cards[client.client_id] = Card(client, course, at, Frame(state))
+            card = Card(client, course, at, Frame(state))
+            card.plain = next((each.plain for each in self._all()), state)
+            self.cards[client.client_id] = card
             card.turn(0, card.start)
         self._set(card, card.step.first)
 
     def follow(self, frame: Frame) -> None:
         """Mark the steps that a frame shows as done, and end the courses that are over."""
         with self._lock:
-            for card in self._ended:
-                card.observe(frame.state)
             for card in tuple(self.cards.values()):
-                card.observe(frame.state)
                 card.follow(frame)
             if not frame.state.busy:
                 ended, self._ended = self._ended, []
                 for card in ended:
                     self._session.do(partial(self._take_back, card), who=card.client.client_id)
+
+    def _all(self) -> tuple[Card, ...]:
+        return (*self.cards.values(), *self._ended)
+
+    def _observe(self, state: State, maker: Card | None = None) -> None:
+        with self._lock:
+            for card in self._all():
+                card.observe(state, maker)
 
     def _take_back(self, card: Card, state: State) -> Act | None:
         """Return the action that takes back what a course has changed; None if nothing is left."""
@@ -244,7 +254,12 @@ class CourseGuide(Runner):
         elif (own.design, own.pose) != (state.design, state.pose):
             self._services.tell(OVER, card.client.client_id)
         title = f"Leave the lesson {course.title}" if course.is_lesson else "End the tour"
-        return None if own == state else end_course(title, own)
+        end = end_course(title, own)
+        after = end.apply(state)
+        with self._lock:
+            for other in self._all():
+                other.forget(after)
+        return None if own == state else end
 
     def _end(self, who: int) -> None:
         """End the course of a browser; a search from a design that it opened is cancelled first."""
@@ -262,7 +277,7 @@ class CourseGuide(Runner):
         act = arrange(card.step.title, settings)
 
         def change(state: State) -> Act:
-            card.make(act, state)
+            self._observe(act.apply(state), card)
             return act
 
         if settings:
@@ -271,7 +286,8 @@ class CourseGuide(Runner):
     def _show(self, card: Card, state: State) -> Act:
         """Return the action that does the step of a card; tell what it cannot reach."""
         act = card.step.solve(state, card.start)
-        after = card.make(act, state)
+        after = act.apply(state)
+        self._observe(after, card)
         lacking = () if after.busy else card.step.lacking(Frame(after), card.start)
         if lacking:
             self._services.tell(BEYOND.format(". ".join(lacking)), card.client.client_id)
