@@ -9,7 +9,7 @@ course had set nothing, to which all that others do is carried over.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from html import escape
@@ -44,7 +44,6 @@ from explorer.page.look import call_script, read_script
 PRESS, OFFER = "tour", "offer"
 BUSY = "the tour changes the design: let the search end first, or cancel it"
 OVER = "What the steps changed is taken back, and what you changed stays. Undo shows it again."
-BEYOND = "Show me cannot do this step with this design. {}."
 STAYS = "The design that the tour opened stays, since it was changed. Undo and History have yours."
 BUTTONS = {
     "Leave": "Take back what the steps have changed; Help and the search begin them again.",
@@ -97,7 +96,7 @@ def carry_over(own: State, before: State, now: State) -> State:
     return move_to(replace(whole, pose=pose), pose, turned.yaw_pitch_roll)
 
 
-@dataclass
+@dataclass(eq=False)
 class Card:
     """The course of one browser, its step, and whether it is done.
 
@@ -105,7 +104,7 @@ class Card:
         start: The frame in which the step began.
         own: The state as it would be if the course had set nothing.
         plain: The state as it would be if no course of any browser had set anything.
-        opened: The state in which the course opened a design; None if it has opened none.
+        opens: Whether the course has opened a design.
     """
 
     client: viser.ClientHandle
@@ -115,7 +114,7 @@ class Card:
     is_done: bool = False
     own: State = field(init=False)
     plain: State = field(init=False)
-    opened: State | None = None
+    opens: bool = False
     _seen: State = field(init=False)
     _shown: str = ""
 
@@ -124,8 +123,7 @@ class Card:
 
     def observe(self, state: State, maker: Card | None = None) -> None:
         """Take in the next state, which the course of a card made; None for a user."""
-        if maker is self and state.base != self._seen.base:
-            self.opened = state
+        self.opens |= maker is self and state.base != self._seen.base
         before, self._seen = self._seen, self._without_search(state)
         if maker is not self:
             self.own = carry_over(self.own, before, self._seen)
@@ -138,10 +136,9 @@ class Card:
 
     def own_search(self, state: State) -> SearchRun | None:
         """Return the last search if it began at a design that the course has opened; else None."""
-        run, opened = Optimisation.of(state).run, self.opened
-        if run is None or opened is None or run.own.design != opened.design:
-            return None
-        return run if run.number > Optimisation.of(opened).count else None
+        run = Optimisation.of(state).run
+        is_own = run is not None and self.own.base != state.base == run.own.base
+        return run if is_own else None
 
     def _without_search(self, state: State) -> State:
         run = self.own_search(state)
@@ -233,8 +230,7 @@ class CourseGuide(Runner):
             for card in tuple(self.cards.values()):
                 card.follow(frame)
             if not frame.state.busy:
-                ended, self._ended = self._ended, []
-                for card in ended:
+                for card in self._ended:
                     self._session.do(partial(self._take_back, card), who=card.client.client_id)
 
     def _all(self) -> tuple[Card, ...]:
@@ -247,9 +243,10 @@ class CourseGuide(Runner):
 
     def _take_back(self, card: Card, state: State) -> Act | None:
         """Return the action that takes back what a course has changed; None if nothing is left."""
-        card.observe(state)
         course, own = card.course, card.own
-        if card.opened is not None and own.base == card.opened.base:
+        if card not in self._ended:
+            return None
+        if card.opens and own.base == state.base:
             self._services.tell(STAYS, card.client.client_id)
         elif (own.design, own.pose) != (state.design, state.pose):
             self._services.tell(OVER, card.client.client_id)
@@ -257,6 +254,7 @@ class CourseGuide(Runner):
         end = end_course(title, own)
         after = end.apply(state)
         with self._lock:
+            self._ended.remove(card)
             for other in self._all():
                 other.forget(after)
         return None if own == state else end
@@ -274,24 +272,18 @@ class CourseGuide(Runner):
 
     def _set(self, card: Card, settings: tuple[Relation, ...]) -> None:
         """Make settings of a step, if there are any."""
-        act = arrange(card.step.title, settings)
+        if settings:
+            self._do(card, lambda _: arrange(card.step.title, settings))
+
+    def _do(self, card: Card, act_in: Callable[[State], Act]) -> None:
+        """Do what a function returns for the present state, as an action of a course."""
 
         def change(state: State) -> Act:
+            act = act_in(state)
             self._observe(act.apply(state), card)
             return act
 
-        if settings:
-            self._session.do(change, who=card.client.client_id)
-
-    def _show(self, card: Card, state: State) -> Act:
-        """Return the action that does the step of a card; tell what it cannot reach."""
-        act = card.step.solve(state, card.start)
-        after = act.apply(state)
-        self._observe(after, card)
-        lacking = () if after.busy else card.step.lacking(Frame(after), card.start)
-        if lacking:
-            self._services.tell(BEYOND.format(". ".join(lacking)), card.client.client_id)
-        return act
+        self._session.do(change, who=card.client.client_id)
 
     def _press(self, name: str, client: viser.ClientHandle) -> None:
         card = self.cards.get(client.client_id)
@@ -302,7 +294,7 @@ class CourseGuide(Runner):
             return
         is_on = name in ("Next", "Skip")
         if name == "Show me":
-            self._session.do(partial(self._show, card), who=client.client_id)
+            self._do(card, lambda state: card.step.solve(state, card.start))
         elif name == "Leave" or (is_on and card.is_last):
             self._end(client.client_id)
         else:

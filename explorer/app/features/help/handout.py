@@ -11,7 +11,7 @@ from explorer.app.features.help.lessons import Course, Step, arrange
 from explorer.app.features.paths.state import journey_of
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
-from explorer.errors import ExplorerError
+from explorer.errors import InputError
 from explorer.export.drawings.figure import figure_svg
 from explorer.export.drawings.markup import element, illustration, paragraph
 from explorer.export.drawings.mechanism import fit_view, points_to_show
@@ -42,7 +42,7 @@ def solve(course: Course, state: State) -> Iterator[tuple[Step, Frame]]:
     """Yield each step of a course with the frame in which "Show me" has done it."""
     for step in course.steps:
         begun = Frame(arrange(step.title, step.first).apply(state))
-        with suppress(ExplorerError):
+        with suppress(InputError):
             state = step.solve(begun.state, begun).apply(begun.state)
         yield step, Frame(state)
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -135,16 +134,22 @@ class Step:
     def solve(self, state: State, start: Frame) -> Act:
         """Return the action that does the step: from a state, or from home if it cannot from there.
 
-        Where neither does it, the action is the one from the state, whose errors may tell why.
+        Raises:
+            InputError: Neither does it.
         """
-        here, from_home = (arrange(self.title, (*way, *self.shown)) for way in ((), HOME))
-        for act in (here, from_home):
-            with suppress(ExplorerError):
+        words = ""
+        for way in ((), HOME):
+            act = arrange(self.title, (*way, *self.shown))
+            try:
                 after = act.apply(state)
-                # A search takes its time.
-                if after.busy or self.is_done(Frame(after), start):
-                    return act
-        return here
+            except ExplorerError as error:
+                words = str(error)
+                continue
+            words = ". ".join(self.lacking(Frame(after), start))
+            # A search takes its time.
+            if after.busy or not words:
+                return act
+        raise InputError(f"this design cannot do the step from here or from home. {words}")
 
     def readings(self, now: Frame, start: Frame) -> list[str]:
         """Return what a frame has of each thing that the step asks for."""
