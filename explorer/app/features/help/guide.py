@@ -9,7 +9,7 @@ course had set nothing, to which all that others do is carried over.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from html import escape
@@ -77,12 +77,11 @@ def end_course(state: State, title: str, own: State) -> State:
 
 def carry_over(own: State, before: State, now: State) -> State:
     """Return a state with what others changed between two states in which a course has a part."""
-    lasts, journey = Paths.of(before).journey, Paths.of(now).journey
-    if lasts is not None and journey not in (None, lasts) and lasts.poses == journey.poses:
-        mine = Paths.of(own).journey
-        if now.pose == journey.pose and (mine is None or mine.poses != journey.poses):
-            # The path that the course made was played.
-            before = move_to(with_value(before, "paths.journey", journey), journey.pose)
+    mine, last, journey = (Paths.of(each).journey for each in (own, before, now))
+    if mine != last and journey not in (None, last) and last and last.poses == journey.poses:
+        # The path that the course made was played.
+        before = with_value(before, "paths.journey", journey)
+        before = move_to(before, now.pose) if now.pose == journey.pose else before
     whole = with_change(own, before, now)
     if before.design != now.design and not own.base == before.base == now.base:
         # A design that was opened stays, and so does one of the course once it was changed.
@@ -129,10 +128,6 @@ class Card:
             self.own = carry_over(self.own, before, self._seen)
         if maker is None:
             self.plain = carry_over(self.plain, before, self._seen)
-
-    def forget(self, state: State) -> None:
-        """Take in a state in which what the course of another card had set is taken back."""
-        self.own, self._seen = self.plain, self._without_search(state)
 
     def own_search(self, state: State) -> SearchRun | None:
         """Return the last search if it began at a design that the course has opened; else None."""
@@ -255,8 +250,9 @@ class CourseGuide(Runner):
         after = end.apply(state)
         with self._lock:
             self._ended.remove(card)
+            self._observe(after, card)
             for other in self._all():
-                other.forget(after)
+                other.own = other.plain
         return None if own == state else end
 
     def _end(self, who: int) -> None:
@@ -270,20 +266,17 @@ class CourseGuide(Runner):
                     lambda state: cancel_run() if card.own_search(state) else None, who=who
                 )
 
-    def _set(self, card: Card, settings: tuple[Relation, ...]) -> None:
-        """Make settings of a step, if there are any."""
-        if settings:
-            self._do(card, lambda _: arrange(card.step.title, settings))
-
-    def _do(self, card: Card, act_in: Callable[[State], Act]) -> None:
-        """Do what a function returns for the present state, as an action of a course."""
+    def _set(self, card: Card, settings: tuple[Relation, ...] | None = None) -> None:
+        """Make settings of a step, if there are any, or those that do it for None."""
+        step, start = card.step, card.start
 
         def change(state: State) -> Act:
-            act = act_in(state)
+            act = step.solve(state, start) if settings is None else arrange(step.title, settings)
             self._observe(act.apply(state), card)
             return act
 
-        self._session.do(change, who=card.client.client_id)
+        if settings != ():
+            self._session.do(change, who=card.client.client_id)
 
     def _press(self, name: str, client: viser.ClientHandle) -> None:
         card = self.cards.get(client.client_id)
@@ -294,7 +287,7 @@ class CourseGuide(Runner):
             return
         is_on = name in ("Next", "Skip")
         if name == "Show me":
-            self._do(card, lambda state: card.step.solve(state, card.start))
+            self._set(card)
         elif name == "Leave" or (is_on and card.is_last):
             self._end(client.client_id)
         else:

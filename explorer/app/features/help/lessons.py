@@ -89,7 +89,8 @@ def arrange(state: State, title: str, settings: tuple[Relation, ...]) -> State:
     """Make settings of the step with a title, one after the other; errors are those of each."""
     del title
     for each in settings:
-        state = VALUES[each.name].set(state, each.bound)
+        change = VALUES[each.name].set
+        state = state if change is None else change(state, each.bound)
     return state
 
 
@@ -231,7 +232,8 @@ def _parse(key: str, value: str) -> str | Relation:
     if found is None:
         raise InputError(f"{value!r} is not NAME < NUMBER, NAME > NUMBER or NAME = VALUE")
     (name, sign, bound), is_setting = found.groups(), key != "asked"
-    _check("the values", name, [*VALUES])
+    what = "what can be set" if is_setting else "the values"
+    _check(what, name, [each for each, of in VALUES.items() if of.set or not is_setting])
     options, is_length = VALUES[name].options, VALUES[name].is_length
     _check(f"the signs of {name}", sign, "=" if is_setting else "=≠" if options else "<>=")
     if options:

@@ -24,13 +24,11 @@ from explorer.app.state.state import State
 from explorer.measures.verdict import TITLES
 from explorer.mechanism.machine import Payload
 from explorer.mechanism.margins import TETRAHEDRA
-from explorer.singularity.colours import WARN_SHARE
 from explorer.statics.loaded import LoadedPose
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
 # warning lengths, the factor on a variable, and that on the margin to be the smallest.
 STRIDE, NEAR, GROWTH, FLATTER = 0.1, 0.5, 1.1, 0.5
-MOST_HALVINGS = 40
 FLAT = tuple(map(" ".join, TETRAHEDRA))
 
 
@@ -41,13 +39,13 @@ class Named:
     Attributes:
         read: Function of the present frame and of that in which a step began that returns it, in
             % of the reach if it is a length, or the word of a choice; None where it has none.
-        set: Function from a state to one with another value.
+        set: Function from a state to one with another value; None if it cannot be set.
         options: The words of a choice; () for a number.
         is_length: Whether it is a length.
     """
 
     read: Callable[[Frame, Frame], float | str | None]
-    set: Callable[[State, Any], State]
+    set: Callable[[State, Any], State] | None = None
     options: tuple[str, ...] = ()
     is_length: bool = False
 
@@ -116,8 +114,7 @@ def _to_verdict(state: State, title: str) -> State:
         is_there = Frame(state).snapshot.is_singular
         return state if is_there else go_to_singularity(None).apply(state)
     # Lower b4 towards the base plane: δ3 is its height.
-    warned = min(state.warn_below, WARN_SHARE * state.design.reach)
-    height = math.copysign(NEAR * warned, state.pose.position[2])
+    height = math.copysign(NEAR * state.warn_below, state.pose.position[2])
     return set_position(2, height + float(state.offset(state.pose.rotation)[2])).apply(state)
 
 
@@ -125,17 +122,6 @@ def _amplification(now: Frame, _: Frame) -> float:
     """Return one over the smallest singular value of J with lengths over the reach."""
     least = float(now.snapshot.smallest_singular_value)
     return 1.0 / least if least > 0.0 else math.inf
-
-
-def _set_amplification(state: State, bound: float) -> State:
-    """Return a state with an amplification of at least a bound, by the smallest margin alone."""
-    for _ in range(MOST_HALVINGS):
-        frame = Frame(state)
-        if _amplification(frame, frame) >= bound:
-            break
-        index = _flattest(frame)
-        state = _flatten(state, index, 0.5 * _sizes(frame)[index])
-    return state
 
 
 def _load(now: Frame, _: Frame) -> str:
@@ -162,7 +148,11 @@ def _sign_changes(now: Frame, _: Frame) -> float | None:
 
 
 def _cross(state: State, count: float) -> State:
-    """Return a state that plays a straight path to a mode in which so many signs differ."""
+    """Return a state that plays a straight path to a mode in which so many signs differ.
+
+    It begins at home if the pose is singular, where some of the modes coincide.
+    """
+    state = go_home().apply(state) if Frame(state).snapshot.is_singular else state
     goal = state.mode ^ (0, 4, 5, 7)[int(count)]
     state = with_value(state, "paths.stops", (Stop(), Stop(goal)))
     return go().apply(with_value(state, "paths.kind", "straight"))
@@ -199,7 +189,7 @@ VALUES: dict[str, Named] = {
     "smallest margin": _margin(_flattest),
     "flattest tetrahedron": Named(lambda now, _: FLAT[_flattest(now)], _make_flattest, FLAT),
     "verdict": Named(lambda now, _: now.verdict.title, _to_verdict, (*TITLES.values(),)),
-    "amplification": Named(_amplification, _set_amplification),
+    "amplification": Named(_amplification),
     "load": Named(_load, _set_load, ("held", "not held")),
     "mode": Named(
         lambda now, _: None if now.snapshot.is_singular else str(now.state.mode),
