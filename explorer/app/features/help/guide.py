@@ -132,8 +132,7 @@ class Card:
     def own_search(self, state: State) -> SearchRun | None:
         """Return the last search if it began at a design that the course has opened; else None."""
         run = Optimisation.of(state).run
-        is_own = run is not None and self.own.base != state.base == run.own.base
-        return run if is_own else None
+        return run if run and self.own.base != state.base == run.own.base else None
 
     def _without_search(self, state: State) -> State:
         run = self.own_search(state)
@@ -262,9 +261,7 @@ class CourseGuide(Runner):
             if card is not None:
                 card.close()
                 self._ended.append(card)
-                self._session.do(
-                    lambda state: cancel_run() if card.own_search(state) else None, who=who
-                )
+                self._session.do(lambda s: cancel_run() if card.own_search(s) else None, who=who)
 
     def _set(self, card: Card, settings: tuple[Relation, ...] | None = None) -> None:
         """Make settings of a step, if there are any, or those that do it for None."""

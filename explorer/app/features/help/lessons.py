@@ -94,10 +94,6 @@ def arrange(state: State, title: str, settings: tuple[Relation, ...]) -> State:
     return state
 
 
-HOME = (Relation("verdict", "=", TITLES["clear"]),)
-"""The setting that moves the platform home."""
-
-
 @dataclass(frozen=True)
 class Step:
     """A step of a course: a task of the user, at a tab of the controls.
@@ -138,8 +134,8 @@ class Step:
         Raises:
             InputError: Neither does it.
         """
-        words = ""
-        for way in ((), HOME):
+        words, home = "", Relation("verdict", "=", TITLES["clear"])
+        for way in ((), (home,)):
             act = arrange(self.title, (*way, *self.shown))
             try:
                 after = act.apply(state)
