@@ -49,7 +49,10 @@ def test_link_of_a_state_without_any_default_holds_all_of_it() -> None:
 def test_link_of_the_first_schema_is_read() -> None:
     fragment = (DATA / "link.txt").read_text()
     assert fragment.startswith("1.")
-    assert decode_link(fragment) == Link.of(rich_state())
+    found, own = decode_link(fragment), Link.of(rich_state())
+    # That pose lies on a path, whose law may place it anew in the last digits.
+    assert found.pose.position == pytest.approx(own.pose.position, abs=1e-3)
+    assert msgspec.structs.replace(found, pose=own.pose) == own
 
 
 def test_name_of_a_preset_is_a_link_to_it() -> None:

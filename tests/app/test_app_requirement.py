@@ -167,7 +167,7 @@ def test_gravity_and_data_sheet_are_taken_into_the_form(
     controls["Data sheet"].value = "nothing"
     press(controls["Read the row"])
     assert Required.of(desk.state).form == form
-    assert desk.complaints[-1].startswith("no value in 'nothing'")
+    assert desk.complaints[-1].startswith("no value in the row: name each")
 
 
 def test_search_shows_machines_as_they_are_found_and_drops_those_of_an_earlier_one(
