@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import signal
 import socket
@@ -11,8 +12,8 @@ import threading
 import time
 import urllib.request
 from collections.abc import Callable, Generator, Iterator
-from contextlib import ExitStack, contextmanager
-from typing import NoReturn
+from contextlib import ExitStack, closing, contextmanager
+from typing import Any, NoReturn
 
 import pytest
 import viser
@@ -22,7 +23,7 @@ from explorer.app import server as server_module
 from explorer.app.server import Running, start
 from explorer.errors import ServerError
 from explorer.mechanism.design_file import PRESETS
-from explorer.page.browser.viser_server import start_viser
+from explorer.page.browser.viser_server import start_viser, stop_viser
 from explorer.page.security import Serve
 
 DESIGN = PRESETS["paper-optimal"]
@@ -204,3 +205,23 @@ def test_serve_interrupted_soon_stops_quietly(delay: float) -> None:
         process.stderr.readline()
         time.sleep(delay)
         assert_stops_quietly(process)
+
+
+def test_server_that_stops_leaves_no_connection_open() -> None:
+    server = start_viser("127.0.0.1", 0)
+    internals: Any = server
+    loop = internals._websock_server._background_event_loop
+    accepted: list[asyncio.BaseTransport] = []
+
+    class Accepting(asyncio.Protocol):
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            accepted.append(transport)
+
+    listening = loop.create_server(Accepting, "127.0.0.1", 0)
+    listener = asyncio.run_coroutine_threadsafe(listening, loop).result(60.0)
+    with closing(socket.create_connection(listener.sockets[0].getsockname())):
+        wait_for(lambda: accepted)
+        stop_viser(server)
+        assert accepted[0].is_closing()
+        assert loop.is_closed()
+    listener.close()

@@ -7,6 +7,7 @@ import contextlib
 import io
 import warnings
 from collections.abc import AsyncGenerator, Callable, Generator, Sequence
+from functools import partial
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
@@ -126,8 +127,22 @@ def _serve_through(
 
 def stop_viser(server: viser.ViserServer) -> None:
     """Stop a server, without the line that its thread prints to standard output."""
+    # Gap: viser closes its loop without the connections that came while it was stopping.
+    internals: Any = server
+    loop = internals._websock_server._background_event_loop
+    loop.close = partial(_close_with_connections, loop, loop.close)
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
+
+
+def _close_with_connections(loop: Any, close: Callable[[], None]) -> None:
+    """Close a loop that has ended, and its open connections before it."""
+    for transport in [*getattr(loop, "_transports", {}).values()]:
+        transport.abort()
+    # One round, in which the connections end.
+    loop.stop()
+    loop.run_forever()
+    close()
 
 
 def protect(server: viser.ViserServer) -> None:
