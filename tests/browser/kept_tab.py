@@ -30,6 +30,7 @@ class KeptTab:
         """Return the tab as if it was opened now, drawing its scene or not."""
         if self.tab is None:
             self.tab = self.open()
+            self.tab.settle()
         else:
             self.tidy(self.tab)
             self.tab.begin_anew()

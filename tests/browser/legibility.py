@@ -121,6 +121,16 @@ MARK_CONTRASTS = """(selector) => {
         });
 }"""
 
+# Open the folders that are seen and closed, all in one look: the page itself opens a little later
+# those that were open when their tab was in front before. Return how many there were.
+OPEN_FOLDERS = """() => {
+    const heads = document.querySelectorAll(
+        ".mantine-Paper-root > .mantine-Paper-root:first-child:has(> .tabler-icon-chevron-down)");
+    const closed = [...heads].filter((each) => each.checkVisibility({ visibilityProperty: true }));
+    for (const each of closed) each.click();
+    return closed.length;
+}"""
+
 
 @dataclass(frozen=True)
 class Text:
@@ -165,12 +175,9 @@ def texts_of(page: Page, within: str = "") -> list[Text]:
 
 
 def open_folders(page: Page) -> None:
-    """Open the folders that are seen and closed."""
-    closed = page.locator(
-        ".mantine-Paper-root > .mantine-Paper-root:has(.tabler-icon-chevron-down)"
-    )
-    while folder := next((each for each in closed.all() if each.is_visible()), None):
-        folder.click()
+    """Open the folders that are seen and closed, and those in them."""
+    while page.evaluate(OPEN_FOLDERS):
+        pass
 
 
 def mark_contrasts(page: Page, selector: str) -> list[float]:

@@ -68,8 +68,11 @@ def suspended(running: Running) -> Generator[None]:
     goes_on = threading.Event()
     server: Any = running.viser
     server._websock_server._background_event_loop.call_soon_threadsafe(goes_on.wait)
-    yield
-    goes_on.set()
+    try:
+        yield
+    finally:
+        # The explorer could not even be stopped.
+        goes_on.set()
 
 
 def wait_in_vain(tab: Tab, seconds: float) -> None:

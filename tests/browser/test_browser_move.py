@@ -148,6 +148,7 @@ def test_length_that_cannot_close_leaves_the_pose_and_offers_the_nearest(tab: Ta
     expect(alert).to_be_hidden()
     expect(button).to_be_disabled()
     below = tab.page.get_by_role("button", name="Home pose")
+    tab.settle()
     place = below.bounding_box()
 
     before = tab.state

@@ -217,8 +217,9 @@ def test_poses_of_a_path_are_taken_from_a_file(
         with newcomer.page.expect_file_chooser() as chooser:
             newcomer.press("Poses from a file …")
         chooser.value.set_files(table)
-        newcomer.wait()
+        # It closes by itself.
         expect(newcomer.notices(words)).to_have_count(1)
+        newcomer.wait()
     newcomer.sees(re.compile(r"^2\. 100\.0, 50\.0, 110\.0"))
     assert [stop.pause for stop in stops_of(data_tab.state)] == [0.2, 0.0]
 
@@ -242,8 +243,8 @@ def test_machine_for_a_task_is_found_and_taken_along_in_25_presses(
     newcomer.type_all("Length ratio", "1.9", "0", "250", "0", "14", "4", "50")
     assert newcomer.presses == 16
     newcomer.press("Find machines")
-    newcomer.button("Open Balanced").wait_for()
     # A search takes a minute on a busy machine.
+    newcomer.button("Open Balanced").wait_for(timeout=300_000)
     newcomer.button("Find machines").wait_for(timeout=300_000)
     newcomer.press("Open Balanced")
     newcomer.sees("Requirement kept")
@@ -276,11 +277,13 @@ def test_mechanism_ten_thousand_times_larger_is_in_sight_and_again_after_undo(
     file = tmp_path / "larger.json"
     file.write_bytes(encode_design(scaled_design(OPTIMAL, 1e4)))
     newcomer.upload(file)
+    # The one before is in sight, too, until the file is open.
+    data_tab.wait_for(lambda: data_tab.state.design != OPTIMAL, "the larger design")
     data_tab.wait_for(is_in_sight, "the larger mechanism in sight")
     newcomer.presses_for()
     newcomer.press(re.compile("^Undo"))
+    data_tab.wait_for(lambda: data_tab.state.design == OPTIMAL, "the design of before")
     data_tab.wait_for(is_in_sight, "the mechanism in sight again")
-    assert data_tab.state.design == OPTIMAL
     assert newcomer.presses_for() == 1
 
 
@@ -327,6 +330,8 @@ def test_term_is_found_by_the_search_and_page_by_the_question_mark(newcomer: New
         "solidworks": "SolidWorks",
     }.items():
         page.get_by_placeholder("Search commands").fill(words)
+        # What was found for the words before is shown until then.
+        newcomer.wait()
         newcomer.sees(re.compile(re.escape(found)))
     newcomer.key("Escape")
     newcomer.presses_for()

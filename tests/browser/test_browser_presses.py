@@ -146,6 +146,7 @@ def test_press_counts_after_a_reload_and_on_markup_that_is_replaced_meanwhile(ta
 def test_command_of_an_answer_is_copied(tab: Tab, title: str, commands: tuple[str, ...]) -> None:
     tab.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     tab.turn_to(title)
+    tab.settle()
     buttons = tab.page.get_by_role("button", name="Copy the command line").locator("visible=true")
     for button, command in zip(buttons.all(), commands, strict=True):
         button.click()

@@ -127,7 +127,7 @@ def test_link_is_copied_and_opened_and_a_damaged_one_is_refused(tab: Tab) -> Non
         if "replaceState" in opens:
             tab.reload()
         tab.wait_for(lambda: Link.of(tab.state) == wanted, "the state of the link")
-        assert "#" not in tab.page.url
+        tab.wait_for(lambda: "#" not in tab.page.url, "an address without the state")
     tab.page.evaluate("it => { location.hash = it }", fragment[:-1])
     expect(tab.page.get_by_text("The link is damaged")).to_be_visible()
     assert Link.of(tab.state) == wanted

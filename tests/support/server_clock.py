@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent import futures
 from functools import partial
+from typing import Any
 from unittest import mock
 
 from explorer.app.features.designs.feature import SavedDesigns
@@ -55,6 +57,13 @@ def wait_until_drawn(page: Page, timeout: float = 30.0) -> bool:
     return idle and page.session.wait_until_idle(deadline - time.monotonic())
 
 
+def wait_until_handled(page: Page, timeout: float) -> bool:
+    """Wait until the presses on markup that have come are handled; return whether they are."""
+    buttons: Any = page.buttons
+    # One thread handles them in their order.
+    return not futures.wait([buttons._thread.submit(int)], timeout).not_done
+
+
 def wait_until_quiet(timeout: float) -> bool:
     """Wait until no pause is pending and no call after one is at work; return whether none is."""
     with clock.changed:
@@ -69,7 +78,10 @@ def settle(page: Page, timeout: float) -> bool:
     """
     deadline = time.monotonic() + timeout
     services = page.services
-    waits: list[Callable[[float], bool]] = [partial(wait_until_drawn, page)]
+    waits: list[Callable[[float], bool]] = [
+        partial(wait_until_handled, page),
+        partial(wait_until_drawn, page),
+    ]
     if services.has(SavedDesigns):
         waits.append(services.get(SavedDesigns).wait_until_idle)
     with mock.patch.object(assigning, "QUIET_SECONDS", 0.0):
