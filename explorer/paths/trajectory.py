@@ -97,9 +97,9 @@ def trajectory(
         raise InputError(f"the speed must be above zero; got {actuator_speed:g}")
     moves, count = StraightMoves.along(poses, tool), len(poses) - 1
     law = law or law_at_speed(design, moves, actuator_speed)
-    even = np.linspace(0.0, law.duration, samples, dtype=np.float64)
-    sampled = even if times is None else times
-    at = law.places_at(sampled)
+    if times is None:
+        times = np.linspace(0.0, law.duration, samples, dtype=np.float64)
+    at = law.places_at(times)
     # Moves without a length at either end take no time.
     at[0], at[-1] = 0.0, count
     number = np.minimum(at.astype(np.int64), count - 1)
@@ -110,4 +110,4 @@ def trajectory(
     joints = inverse(design, position, rotation)
     of_tool = None if tool is None else position + tool_offset(rotation, tool)
     quaternion *= signs[:, None]
-    return Trajectory(sampled, joints, position, quaternion, at, design.unit_mm, of_tool)
+    return Trajectory(times, joints, position, quaternion, at, design.unit_mm, of_tool)

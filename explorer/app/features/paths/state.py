@@ -151,9 +151,11 @@ class Journey:
         """Return the place at a time: the number of the move plus the share of it."""
         law = self._course.law
         # Moves without a length at either end take no time.
-        ends = {0.0: 0.0, law.duration: len(self.poses) - 1.0}
-        seconds = min(max(seconds, 0.0), law.duration)
-        return ends.get(seconds, float(law.places_at(np.array([seconds]))[0]))
+        if seconds <= 0.0:
+            return 0.0
+        if seconds >= law.duration:
+            return len(self.poses) - 1.0
+        return float(law.places_at(np.array([seconds]))[0])
 
     def time_at(self, place: float) -> float:
         """Return the time in seconds at a place."""
