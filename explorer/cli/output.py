@@ -21,7 +21,7 @@ from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.folds import FOLDS, to_folds
-from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii
@@ -138,7 +138,7 @@ def assumed_lines(assumed: Sequence[str]) -> Iterator[str]:
 
 def pose_table(design: Design, pose: Pose, tool: Triple | None = None) -> str:
     """Return position, quaternion, angles and folds of a pose, and where its tool is."""
-    angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
+    angles = pose.yaw_pitch_roll
     r, *folds = folds_in_degrees(pose.position, pose.rotation).tolist()
     positions = [("position", _position(design, pose.position))]
     if tool is not None:

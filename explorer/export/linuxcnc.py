@@ -20,7 +20,6 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins, mode_of
-from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding
 from explorer.statics.accuracy import IS_TILT, SOURCES, UNITS, drawing_values
@@ -62,7 +61,7 @@ def linuxcnc_files(design: Design, machine: BuiltMachine | None = None) -> dict[
     _check_home(design)
     pose, unit = design.home_pose, design.unit_mm
     home = unit * inverse(design, pose.position, pose.rotation)
-    angles = yaw_pitch_roll_from_rotation(pose.rotation)[::-1]
+    angles = pose.yaw_pitch_roll[::-1]
     at = np.array([*(unit * np.array(pose.position)), *angles])
     world = list(map(_number, at, [*3 * [unit * design.reach], *3 * [360.0]]))
     axes, joints = axis_ranges(design), joint_ranges(design)

@@ -17,7 +17,6 @@ from explorer.legs.clearance import PAIRS
 from explorer.measures.measure import Case, Measure, Sense, longest_leg
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.margins import MARGIN_KINDS, margins
-from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.orientations.share import orientation_share
@@ -361,7 +360,7 @@ def coordinates() -> Iterable[Measure]:
         "yaw",
         "yaw of home",
         "Yaw of the orientation that the home pose has",
-        lambda case: float(yaw_pitch_roll_from_rotation(case.design.home_pose.rotation)[0]),
+        lambda case: case.design.home_pose.yaw_pitch_roll[0],
         unit="°",
         places=("compare", "optimise"),
     )

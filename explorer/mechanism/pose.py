@@ -64,6 +64,11 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """The rotation matrix, platform to base, shape (3, 3), read-only."""
         return _rotation(self.quaternion)
 
+    @property
+    def yaw_pitch_roll(self) -> Triple:
+        """The angles of the rotation, in degrees, pitch within ±90°; roll is 0 at ±90°."""
+        return _angles(self.quaternion)
+
     @staticmethod
     def of(position: ArrayLike, rotation: ArrayLike) -> Pose:
         """Return the pose with this position (3,) and rotation matrix (3, 3)."""
@@ -123,8 +128,11 @@ def yaw_pitch_roll_from_rotation(rotation: ArrayLike) -> FloatArray:
     Raises:
         InputError: A matrix is not a rotation.
     """
-    matrix = rotation_array(rotation)
-    return Rotation.from_matrix(matrix).as_euler("ZYX", degrees=True, suppress_warnings=True)
+    return _euler(Rotation.from_matrix(rotation_array(rotation)))
+
+
+def _euler(rotation: Rotation) -> FloatArray:
+    return rotation.as_euler("ZYX", degrees=True, suppress_warnings=True)
 
 
 def rotation_array(rotation: ArrayLike) -> FloatArray:
@@ -197,3 +205,8 @@ def _rotation(quaternion: Quadruple) -> FloatArray:
     # All callers share the cached array.
     rotation.flags.writeable = False
     return rotation
+
+
+@functools.lru_cache(64)
+def _angles(quaternion: Quadruple) -> Triple:
+    return arrays.triple(_euler(Rotation.from_quat(quaternion, scalar_first=True)))

@@ -15,7 +15,7 @@ import msgspec
 from explorer.errors import InputError
 from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design
-from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics import checks
 from explorer.numerics.number_text import format_apart
 from explorer.workspace.limits.table import bounds_angles
@@ -162,7 +162,7 @@ def with_values(design: Design, values: Mapping[str, float]) -> Design:
     changed = design.with_variables([values.get(name, value) for name, value in own])
     if YAW in values:
         home = design.home_pose
-        _, pitch, roll = yaw_pitch_roll_from_rotation(home.rotation).tolist()
+        _, pitch, roll = home.yaw_pitch_roll
         home = Pose.of_yaw_pitch_roll(home.position, (values[YAW], pitch, roll))
         changed = msgspec.structs.replace(changed, home=home)
     if REACH in values:
@@ -186,7 +186,7 @@ def start_value(start: Design, name: str) -> float:
     if name in VARIABLES:
         return start.variables[VARIABLES.index(name)]
     if name == YAW:
-        return float(yaw_pitch_roll_from_rotation(start.home_pose.rotation)[0])
+        return start.home_pose.yaw_pitch_roll[0]
     if name == REACH:
         return longest_leg(start)
     raise InputError(f"no variable {name!r}; there are {', '.join((*VARIABLES, *OPTIONAL))}")

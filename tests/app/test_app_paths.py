@@ -82,7 +82,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import set_variable
 from explorer.app.state.moves import set_pose, set_position
 from explorer.app.state.parts import value_at, with_value
-from explorer.app.state.state import State, angles_of, joints_of, open_state
+from explorer.app.state.state import State, joints_of, open_state
 from explorer.errors import InputError
 from explorer.jobs.jobs import Jobs
 from explorer.mechanism.design_file import PRESETS
@@ -488,7 +488,7 @@ def test_pose_is_the_present_one_a_mode_or_six_numbers(
     desk.use(controls()[typed[1]], (-70.0, 10.0, 5.0))
     assert len(desk.session.history.steps) == steps
     assert numbers().position == (9.0, 4.0, 8.0)
-    assert angles_of(numbers()) == pytest.approx((-70.0, 10.0, 5.0))
+    assert numbers().yaw_pitch_roll == pytest.approx((-70.0, 10.0, 5.0))
     assert controls()[typed[1]].value == (-70.0, 10.0, 5.0)
     desk.use(controls()["Pause (s)"], 0.3)
     assert stops_of(desk.state)[index].pause == 0.3

@@ -61,7 +61,7 @@ from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import set_angle, set_mode, set_pose, set_position
-from explorer.app.state.state import State, angles_of, open_state
+from explorer.app.state.state import State, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.mechanism.configuration import Point
 from explorer.mechanism.design import Design
@@ -310,7 +310,7 @@ def test_typed_pose_of_a_path_is_where_the_tool_is(services: Services, desk: Des
     assert typed().pose.quaternion == before.pose.quaternion
     desk.use(controls()["Pose angles (°)"], (-70.0, 10.0, 5.0))
     np.testing.assert_allclose(tool_of(typed()), (9.0, 4.0, 8.0), atol=1e-12)
-    assert angles_of(typed().pose) == pytest.approx((-70.0, 10.0, 5.0))
+    assert typed().pose.yaw_pitch_roll == pytest.approx((-70.0, 10.0, 5.0))
     assert controls()["Pose x, y, z (units)"].value == (9.0, 4.0, 8.0)
 
 

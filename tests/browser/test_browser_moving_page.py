@@ -199,7 +199,7 @@ def test_moving_page_opens_the_design_and_the_pose_of_a_link(
     pose = design.home_pose.turn(np.zeros(3), np.array([0.1, 0.2, 0.3]))
     view = View(coordinates="lengths", flags=False, leaves=True)
     (tmp_path / "page.html").write_bytes(moving_page(OPTIMAL))
-    fragment = encode_link(open_state(design, pose, view))
+    fragment = encode_link(open_state(design, pose, view), (0.6, -0.48, 0.64))
     page.goto(f"{(tmp_path / 'page.html').as_uri()}#{fragment}")
     expect(page.locator("h1")).to_have_text(design.name)
     expect(page).to_have_title(f"{design.name} – flagged 4-4 manipulator")
@@ -209,6 +209,8 @@ def test_moving_page_opens_the_design_and_the_pose_of_a_link(
     position, rotation = state_of(page)
     assert_allclose(position, design.unit_mm * np.array(pose.position), rtol=SHARE)
     assert_allclose(rotation, pose.rotation, rtol=0, atol=SHARE)
+    back = page.evaluate("window.page.scene.axesOf().back")
+    assert_allclose(back, [0.6, -0.48, 0.64], rtol=0, atol=1e-9)
     # The words and the ranges of Python.
     words = [*limit_rows(design)[2], *pair_rows(design)[1]]
     found = page.locator("#limits td:nth-child(2)").all_text_contents()

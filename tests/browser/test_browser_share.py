@@ -30,7 +30,8 @@ from explorer.app.state.view import View
 from explorer.export.controller import kernel_files
 from explorer.export.linuxcnc import linuxcnc_files
 from explorer.export.moving_page import moving_page
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray, triple
 
 untyped: Any = imageio.v3
 
@@ -105,6 +106,18 @@ def test_picture_has_the_size_and_background_that_are_asked_for_and_no_handle(ta
     assert found.structure < 0.05
 
 
+def _direction(tab: Tab) -> Triple:
+    (client,) = tab.running.viser.get_clients().values()
+    away = np.asarray(client.camera.position) - np.asarray(client.camera.look_at)
+    return triple(away / np.linalg.norm(away))
+
+
+def _look_from(tab: Tab, towards: Triple) -> None:
+    (client,) = tab.running.viser.get_clients().values()
+    tab.running.page.services.cameras.turn(client, towards)
+    tab.wait_for(lambda: _direction(tab) == pytest.approx(towards, abs=1e-4), "the camera")
+
+
 def test_link_is_copied_and_opened_and_a_damaged_one_is_refused(tab: Tab) -> None:
     tab.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     session = tab.running.page.session
@@ -112,21 +125,25 @@ def test_link_is_copied_and_opened_and_a_damaged_one_is_refused(tab: Tab) -> Non
     session.do(Set("view.leaves", True))
     tab.settle()
     wanted, address = Link.of(tab.state), tab.page.url.partition("?")[0]
+    turned = (0.6, -0.48, 0.64)
+    _look_from(tab, turned)
     tab.page.get_by_role("button", name="Copy link").click()
 
     def copied() -> str:
         return str(tab.page.evaluate("navigator.clipboard.readText()"))
 
-    tab.wait_for(lambda: copied() == f"{address}#{encode_link(tab.state)}", "the link")
+    tab.wait_for(lambda: copied() == f"{address}#{encode_link(tab.state, turned)}", "the link")
     fragment = copied().partition("#")[2]
     # In a page that is open, and in one that opens.
     for opens in ("location.hash = it", "history.replaceState(null, '', `#${it}`)"):
         session.do(open_design(explorer.PRESETS["buildable"]))
         tab.settle()
+        _look_from(tab, (-0.48, 0.6, 0.64))
         tab.page.evaluate(f"it => {{ {opens} }}", fragment)
         if "replaceState" in opens:
             tab.reload()
         tab.wait_for(lambda: Link.of(tab.state) == wanted, "the state of the link")
+        tab.wait_for(lambda: _direction(tab) == pytest.approx(turned, abs=1e-3), "the direction")
         tab.wait_for(lambda: "#" not in tab.page.url, "an address without the state")
     tab.page.evaluate("it => { location.hash = it }", fragment[:-1])
     expect(tab.page.get_by_text("The link is damaged")).to_be_visible()

@@ -16,7 +16,8 @@ from typing import Literal, get_args
 import numpy as np
 import viser
 
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray, triple
 from explorer.page.browser.viser_gaps import put_camera
 
 ViewName = Literal["isometric", "front", "side", "top"]
@@ -171,10 +172,26 @@ class Cameras:
 
     def fit(self, client: viser.ClientHandle) -> None:
         """Show the whole mechanism in one browser from the present direction of its camera."""
-        towards = np.asarray(client.camera.position) - np.asarray(client.camera.look_at)
-        # A browser never makes its camera vertical, but a script may have.
-        if np.linalg.norm(towards[:2]) > 1e-6 * np.linalg.norm(towards):
-            self.point(client, towards)
+        self.turn(client, self.direction(client))
+
+    def direction(self, client: viser.ClientHandle) -> Triple:
+        """Return the direction from the target of a browser's camera to its eye, to 1e-4.
+
+        It is that of its last place while the user has not moved it, wherever a browser that is
+        still loading reports it.
+        """
+        placement = self._placements.get(client.client_id)
+        if placement is not None and placement.has(client):
+            view = placement.view
+            return DIRECTIONS[view] if isinstance(view, str) else triple(view)
+        away = np.asarray(client.camera.position) - np.asarray(client.camera.look_at)
+        return triple(np.round(away / max(float(np.linalg.norm(away)), 1e-300), 4))
+
+    def turn(self, client: viser.ClientHandle, towards: Triple) -> None:
+        """Show the whole mechanism in one browser from a direction, unless that is along z."""
+        # A browser never makes its camera vertical, but a script or a link may have.
+        if math.hypot(*towards[:2]) > 1e-6 * math.hypot(*towards):
+            self.point(client, np.array(towards))
 
     def connected(self, client: viser.ClientHandle) -> None:
         """Point a new browser's camera, and keep it framed until its user moves it."""

@@ -16,7 +16,7 @@ import numpy as np
 from explorer.app.state import state as states
 from explorer.app.state.actions import action
 from explorer.app.state.parts import with_value
-from explorer.app.state.state import State, angles_of, joints_of, open_state
+from explorer.app.state.state import State, joints_of, open_state
 from explorer.measures.snapshot import evaluate
 from explorer.measures.verdict import Verdict, verdict
 from explorer.mechanism.design import JOINTS
@@ -138,7 +138,7 @@ def move_to(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> S
     return replace(
         state,
         pose=pose,
-        yaw_pitch_roll=angles_of(pose) if yaw_pitch_roll is None else yaw_pitch_roll,
+        yaw_pitch_roll=pose.yaw_pitch_roll if yaw_pitch_roll is None else yaw_pitch_roll,
         joints=joints_of(state.design, pose),
         mode=states.mode_at(pose, state.mode),
         unclosed=None,
@@ -148,7 +148,7 @@ def move_to(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> S
 def assemble(state: State, solution: ForwardKinematics, mode: int) -> State:
     """Return the state in one of the eight poses that its joints have."""
     pose = Pose.of(solution.position[mode], solution.rotation[mode])
-    return replace(state, pose=pose, yaw_pitch_roll=angles_of(pose), mode=mode, unclosed=None)
+    return replace(state, pose=pose, yaw_pitch_roll=pose.yaw_pitch_roll, mode=mode, unclosed=None)
 
 
 # Number of lengths tried within an interval, and of halvings that refine the first clear one.

@@ -204,7 +204,7 @@ class State:
             poses.rotation_from_yaw_pitch_roll(given), tool.rotation
         ):
             return given
-        return angles_of(tool)
+        return tool.yaw_pitch_roll
 
     @property
     def unit(self) -> Unit:
@@ -277,7 +277,7 @@ def open_state(design: Design, pose: Pose | None = None, view: View | None = Non
         design=design,
         base=design,
         pose=at,
-        yaw_pitch_roll=angles_of(at),
+        yaw_pitch_roll=at.yaw_pitch_roll,
         joints=joints_of(design, at),
         mode=mode_at(at, previous=0),
         view=view or View(),
@@ -288,12 +288,6 @@ def joints_of(design: Design, pose: Pose) -> Joints:
     """Return the joints of a pose as plain numbers."""
     l1, d1, d2, d3, d4, l4 = inverse(design, pose.position, pose.rotation).tolist()
     return (l1, d1, d2, d3, d4, l4)
-
-
-def angles_of(pose: Pose) -> Triple:
-    """Return yaw, pitch and roll of a pose in degrees as plain numbers."""
-    yaw, pitch, roll = poses.yaw_pitch_roll_from_rotation(pose.rotation).tolist()
-    return (yaw, pitch, roll)
 
 
 def mode_at(pose: Pose, previous: int) -> int:

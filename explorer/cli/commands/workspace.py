@@ -14,7 +14,7 @@ from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.mechanism.configuration import position_of
-from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS
 from explorer.workspace.accessible import radii, workspace as accessible
@@ -113,7 +113,7 @@ class WorkspaceCommand(
             )
         if self.radius_curve:
             answer.add_curve(radii.radius_curve(case.workspace))
-        angles = "  ".join(output.degrees(yaw_pitch_roll_from_rotation(pose.rotation).tolist()))
+        angles = "  ".join(output.degrees(pose.yaw_pitch_roll))
         head = [output.heading(design), f"yaw pitch roll  {angles}", ""]
         if self.at == "tool":
             at = "  ".join(output.figures(design.tool.position))
@@ -170,7 +170,7 @@ class WorkspaceCommand(
             if self.samples is not None and self.capability is None:
                 raise InputError("--samples needs ranges of angles, --tilt or --capability")
             return None
-        angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
+        angles = pose.yaw_pitch_roll
         pairs = [ends or (angle, angle) for ends, angle in zip(ranges, angles, strict=True)]
         count = self.samples or SAMPLES_ON_RANGE
         return shares.yaw_pitch_roll_range(

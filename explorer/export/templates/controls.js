@@ -588,11 +588,12 @@ window.startPage = (design, link) => {
   if (view.leaves) setShown("folds", true);
   if (view.tetrahedra && !view.tetrahedra.some(Boolean)) setShown("margins", false);
   take(link.pose ? design.poseOf(link.pose) : design.home);
+  if (link.towards) scene.lookFrom(link.towards);
   let framed = false;
   new ResizeObserver(() => {
     if (!framed) fit();
     framed = true;
     request();
   }).observe(find("view"));
-  return { ...mechanism, state, take, change, goToMode };
+  return { ...mechanism, state, scene, take, change, goToMode };
 };

@@ -241,11 +241,13 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, redraw) 
     });
   };
 
-  const rotate = (x, y) => {
-    camera.azimuth -= x;
-    camera.elevation = Math.min(1.55, Math.max(-1.55, camera.elevation + y));
+  const turnTo = (azimuth, elevation) => {
+    camera.azimuth = azimuth;
+    camera.elevation = Math.min(1.55, Math.max(-1.55, elevation));
     redraw();
   };
+  const rotate = (x, y) => turnTo(camera.azimuth - x, camera.elevation + y);
+  const lookFrom = ([x, y, z]) => turnTo(Math.atan2(y, x), Math.atan2(z, Math.hypot(x, y)));
   const zoom = (factor) => {
     camera.distance *= factor;
     redraw();
@@ -472,5 +474,5 @@ window.sceneOf = (canvas, labels, { along, minus, length, cross, dot }, redraw) 
     casting = solid.used;
   };
   const shapes = { clear, cast, pane, tube, line, ball, plate, box };
-  return { ...shapes, draw, label, fit, sees, axesOf, isReady: Boolean(gl) };
+  return { ...shapes, draw, label, fit, sees, lookFrom, axesOf, isReady: Boolean(gl) };
 };

@@ -12,7 +12,6 @@ from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import Kind, Warnings
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, TETRAHEDRA
-from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import UNITS, Unit, format_number
 from explorer.singularity.ellipsoids import Performance, SingularityFreeBall
@@ -92,7 +91,7 @@ def nearest_poses(snapshot: Snapshot) -> block.Table:
     """Return the nearest singular pose of each margin."""
     poses = [nearest.pose for nearest in snapshot.nearest]
     places = np.array([pose.position for pose in poses]).T.tolist()
-    angles = np.array([yaw_pitch_roll_from_rotation(pose.rotation) for pose in poses]).T.tolist()
+    angles = np.array([pose.yaw_pitch_roll for pose in poses]).T.tolist()
     return block.Table(
         "Nearest singular poses",
         (

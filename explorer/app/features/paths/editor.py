@@ -13,7 +13,7 @@ from explorer.app.features.paths.state import Paths, Stop, StopAt
 from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import Action
-from explorer.app.state.state import State, angles_of
+from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import StateCommand
@@ -186,7 +186,7 @@ def numbers_of(state: State, at: StopAt) -> str:
     there = position_of(state.design, pose, state.view.at)
     unit, size = state.unit, state.unit.convert(state.design.reach)
     position = ", ".join(format_fitted(unit.convert(x), size, 4) for x in there)
-    angles = ", ".join(f"{_degrees(angle)}°" for angle in angles_of(pose))
+    angles = ", ".join(f"{_degrees(angle)}°" for angle in pose.yaw_pitch_roll)
     hint = f"x, y, z of {state.point} in {unit.name}; yaw, pitch, roll"
     return f'<span title="{hint}">{position} · {angles}</span>'
 
@@ -202,7 +202,7 @@ def typed_numbers(state: State) -> tuple[Triple, Triple]:
         return ZERO, ZERO
     there = position_of(state.design, pose, state.view.at)
     x, y, z = (snap_to_decimals(coordinate, DECIMALS, state.design.reach) for coordinate in there)
-    yaw, pitch, roll = (snap_to_decimals(angle, DECIMALS, 180.0) for angle in angles_of(pose))
+    yaw, pitch, roll = (snap_to_decimals(angle, DECIMALS, 180.0) for angle in pose.yaw_pitch_roll)
     return (x, y, z), (yaw, pitch, roll)
 
 

@@ -212,7 +212,8 @@ class ShareButtons:
 
     def _copy(self, client: viser.ClientHandle) -> None:
         try:
-            fragment = encode_link(self._services.session.latest_state())
+            state, cameras = self._services.session.latest_state(), self._services.cameras
+            fragment = encode_link(state, cameras.direction(client))
         except InputError as error:
             self._services.complain(sentence(str(error)), client.client_id)
             return
@@ -221,9 +222,13 @@ class ShareButtons:
 
     def _open(self, fragment: str, client: viser.ClientHandle) -> None:
         try:
-            self._services.session.do(open_link(decode_link(fragment)), who=client.client_id)
+            link = decode_link(fragment)
         except InputError as error:
             self._services.complain(sentence(str(error)), client.client_id)
+            return
+        self._services.session.do(open_link(link), who=client.client_id)
+        if link.towards is not None:
+            self._services.cameras.turn(client, link.towards)
 
 
 SHARING = Feature(

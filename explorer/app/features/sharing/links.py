@@ -16,7 +16,7 @@ from explorer.files.fragments import decode_fragment, encode_fragment, sparse
 from explorer.files.json_text import decode_strictly
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 
 LONGEST = 1900
 """Largest length of a fragment, which leaves 100 letters of 2,000 for the address before it."""
@@ -27,6 +27,7 @@ class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         home: The home pose where the design states none, for pages that cannot choose it.
+        towards: Direction from what is looked at to the eye; None for that of a new page.
     """
 
     design: Design
@@ -34,22 +35,23 @@ class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     view: View = View()
     required: Required = Required()
     home: Pose | None = None
+    towards: Triple | None = None
 
     @staticmethod
-    def of(state: State) -> Link:
-        """Return the link to a state."""
+    def of(state: State, towards: Triple | None = None) -> Link:
+        """Return the link to a state, seen from a direction."""
         design = state.design
         home = None if design.home else design.home_pose
-        return Link(design, state.pose, state.view, Required.of(state), home)
+        return Link(design, state.pose, state.view, Required.of(state), home, towards)
 
 
-def encode_link(state: State) -> str:
-    """Return the fragment of the link to a state.
+def encode_link(state: State, towards: Triple | None = None) -> str:
+    """Return the fragment of the link to a state, seen from a direction.
 
     Raises:
         InputError: It is longer than `LONGEST`.
     """
-    fragment = encode_fragment(sparse(Link.of(state)))
+    fragment = encode_fragment(sparse(Link.of(state, towards)))
     if len(fragment) > LONGEST:
         raise InputError(
             f"the link would have {len(fragment):,} letters, and may have {LONGEST:,}: this design "

@@ -95,9 +95,10 @@ class NearestGhost(ScenePart):
 
 def chosen_ghost(placed: Placed) -> NearestSingularity | None:
     """Return the singular pose that the view requests; None if it is the present one."""
-    ghost, poses = placed.frame.state.view.singular.ghost, placed.frame.snapshot.nearest
+    ghost = placed.frame.state.view.singular.ghost
     if ghost == "none":
         return None
+    poses = placed.frame.snapshot.nearest
     is_any = ghost == "nearest"
     chosen = min(poses, key=lambda pose: pose.distance) if is_any else poses[int(ghost[1]) - 1]
     return chosen if chosen.distance > 0.0 else None

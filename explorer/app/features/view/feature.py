@@ -170,6 +170,8 @@ SHADOW: dict[bool, dict[str, Rgb]] = {
 CORNERS = 32
 ANGLES = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
 OUTWARD = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+# Radii of a flat disc of size one, (3, 2).
+DISC = np.eye(3)[:, :2]
 # Both plates, and as many legs as the twin has.
 OUTLINES = 2 + len(TWIN)
 # Rows that project a direction along the sun's rays on the ground.
@@ -258,33 +260,31 @@ def shadow_outlines(placed: Placed, ground: float) -> list[FloatArray]:
         feet = np.array([p[name] * [1.0, 1.0, 0.0] for name in ("a1", "a2", "a3")])
         depths = (0.0, bodies.PLATE_THICKNESS)
         discs = np.concatenate([feet + [0.0, 0.0, bodies.PLATE_TOP - t] for t in depths])
-        outlines.append(_outline(discs, bodies.BASE_RADIUS * np.eye(3)[:, :2], ground))
+        outlines.append(_outlines(discs, bodies.BASE_RADIUS * DISC, ground))
         rotation = placed.frame.snapshot.rotation
         local = np.array(list(placed.platform_points.values()))
         centres = local + [0.0, 0.0, bodies.PLATFORM_SHIFT * size * placed.facing]
         axes = bodies.PLATFORM_RADIUS * size * rotation[:, :2]
-        outlines.append(_outline(p["b4"] + centres @ rotation.T, axes, ground))
+        outlines.append(_outlines(p["b4"] + centres @ rotation.T, axes, ground))
     if view.legs and (placed.is_schematic or view.is_twin):
         twin = [(p[base], p[tip]) for base, tip in TWIN]
-        legs = twin if view.is_twin else list(zip(*placed.struts, strict=True))
+        legs = np.array(twin) if view.is_twin else np.stack(placed.struts, axis=1)
         radii = np.zeros(len(twin)) if view.is_twin else placed.leg_radii
         radii = np.where(radii > 0.0, bodies.SHARES[0] * radii, bodies.AXIS_RADIUS)
-        outlines += [
-            _outline(np.stack(leg), radius * np.eye(3)[:, :2], ground)
-            for leg, radius in zip(legs, radii.tolist(), strict=True)
-        ]
+        outlines += list(_outlines(legs, radii[:, None, None] * DISC, ground))
     return outlines
 
 
-def _outline(centres: FloatArray, axes: FloatArray, ground: float) -> FloatArray:
-    """Return the shadow of n equal discs with two radii as `axes` (3, 2), shape (CORNERS, 2)."""
+def _outlines(centres: FloatArray, axes: FloatArray, ground: float) -> FloatArray:
+    """Return shadows (..., CORNERS, 2) of equal discs at (..., n, 3), two radii as (..., 3, 2)."""
     flat = (centres - [0.0, 0.0, ground]) @ PROJECTION.T
     # Farthest point of an ellipse in each direction, seen from its centre.
     ellipse = PROJECTION @ axes
     reach = OUTWARD @ ellipse
-    lengths = np.linalg.norm(reach, axis=1, keepdims=True)
-    rim = (reach / np.maximum(lengths, 1e-9)) @ ellipse.T
-    return flat[np.argmax(flat @ OUTWARD.T, axis=0)] + rim
+    lengths = np.linalg.norm(reach, axis=-1, keepdims=True)
+    rim = (reach / np.maximum(lengths, 1e-9)) @ np.swapaxes(ellipse, -1, -2)
+    farthest = np.argmax(flat @ OUTWARD.T, axis=-2)
+    return np.take_along_axis(flat, farthest[..., None], axis=-2) + rim
 
 
 VIEW = Feature(
