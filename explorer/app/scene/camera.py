@@ -175,17 +175,17 @@ class Cameras:
         self.turn(client, self.direction(client))
 
     def direction(self, client: viser.ClientHandle) -> Triple:
-        """Return the direction from the target of a browser's camera to its eye, to 1e-4.
+        """Return the direction from the target of a browser's camera to its eye, of length one.
 
         It is that of its last place while the user has not moved it, wherever a browser that is
         still loading reports it.
         """
         placement = self._placements.get(client.client_id)
         if placement is not None and placement.has(client):
-            view = placement.view
-            return DIRECTIONS[view] if isinstance(view, str) else triple(view)
-        away = np.asarray(client.camera.position) - np.asarray(client.camera.look_at)
-        return triple(np.round(away / max(float(np.linalg.norm(away)), 1e-300), 4))
+            away = np.array(DIRECTIONS[view]) if isinstance(view := placement.view, str) else view
+        else:
+            away = np.asarray(client.camera.position) - np.asarray(client.camera.look_at)
+        return triple(away / max(float(np.linalg.norm(away)), 1e-300))
 
     def turn(self, client: viser.ClientHandle, towards: Triple) -> None:
         """Show the whole mechanism in one browser from a direction, unless that is along z."""

@@ -41,6 +41,8 @@ from explorer.page.widgets.assigning import Update
 PRESS = "export"
 # Names of presses that copy the link to the state, and that open one.
 COPY, OPEN_LINK = "link.copy", "link.open"
+# Decimals of the direction of a camera in a link.
+DIGITS = 4
 LINK_HINT = "It opens this design, requirement, pose and view in any explorer or moving page."
 PICTURES = {
     "PNG 1920 × 1080": ((1920, 1080), False),
@@ -213,7 +215,8 @@ class ShareButtons:
     def _copy(self, client: viser.ClientHandle) -> None:
         try:
             state, cameras = self._services.session.latest_state(), self._services.cameras
-            fragment = encode_link(state, cameras.direction(client))
+            x, y, z = (round(part, DIGITS) for part in cameras.direction(client))
+            fragment = encode_link(state, (x, y, z))
         except InputError as error:
             self._services.complain(sentence(str(error)), client.client_id)
             return
