@@ -20,6 +20,7 @@ from explorer.app.features.calibration.feature import (
     Calibrated,
     CalibrationPanel,
     calibrate_table,
+    open_table,
 )
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Services
@@ -85,6 +86,10 @@ def test_table_that_is_dropped_is_measured_or_has_the_targets(page: Services, de
     drop(page, TABLE_OF_TARGETS, "t.CSV")
     assert Calibrated.of(desk.state).targets == TABLE_OF_TARGETS
     assert Calibrated.of(desk.state).measured == table
+    # Who meant the poses of a path is told where these are opened.
+    _, words = open_table("targets", page, TABLE_OF_TARGETS.encode(), "t.csv")
+    assert "Target positions of the calibration" in words
+    assert "tab Paths, by Poses from a file" in words
     desk.session.do(open_design(PRESETS["paper-initial"]))
     desk.session.wait_until_idle()
     assert Calibrated.of(desk.state) == Calibrated()

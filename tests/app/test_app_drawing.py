@@ -34,6 +34,7 @@ from explorer.app.scene.shapes import cylinder, plate, sphere, turn_z_to
 from explorer.app.scene.surfaces import COLLIDING, PLAIN
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
+from explorer.app.state.view import LengthName, View
 from explorer.mechanism import rgb as colours
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
@@ -128,16 +129,23 @@ def test_view_holds_the_whole_mechanism_and_little_more(
     assert 0.9 < max(across.max(), upward.max()) <= 1.0
 
 
-@given(st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
-def test_squares_of_the_ground_have_the_size_of_their_label(factor: float, unit_mm: float) -> None:
+@given(st.floats(1e-3, 1e3), st.floats(1e-3, 1e3), st.sampled_from(["mm", "design units"]))
+def test_squares_of_the_ground_have_the_size_of_their_label(
+    factor: float, unit_mm: float, lengths: LengthName
+) -> None:
     design = scaled_design(PRESETS["paper-optimal"], factor)
-    placed = Placed(Frame(open_state(msgspec.structs.replace(design, unit_mm=unit_mm))))
-    assert float(f"{placed.square_mm:.6e}"[0]) in (1.0, 2.0, 5.0)
-    assert f"{placed.square_mm:.6e}"[1:8] == ".000000"
-    # Along the base's axis lie as many squares as a2 is millimetres away.
+    design = msgspec.structs.replace(design, unit_mm=unit_mm)
+    state = open_state(design, view=View(lengths=lengths))
+    placed = Placed(Frame(state))
+    size = f"{placed.square_shown:.6e}"
+    assert float(size[0]) in (1.0, 2.0, 5.0)
+    assert size[1:8] == ".000000"
+    # Along the base's axis lie as many squares as a2 is millimetres, or design units, away.
     drawn = float(np.linalg.norm(placed.points["a2"] - placed.points["a1"]))
-    real = unit_mm * float(np.linalg.norm(placed.frame.snapshot.points.a2))
-    assert drawn / placed.square == pytest.approx(real / placed.square_mm)
+    shown = (unit_mm if lengths == "mm" else 1.0) * float(
+        np.linalg.norm(placed.frame.snapshot.points.a2)
+    )
+    assert drawn / placed.square == pytest.approx(shown / placed.square_shown)
     assert 0.5 <= placed.square <= 2.0
 
 

@@ -306,6 +306,13 @@ def test_show_me_does_each_step_from_a_singular_pose(lesson: Course, index: int)
         assert desk.complaints == desk.told == []
 
 
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_amplification_in_a_singular_pose_is_told_as_infinite(index: int) -> None:
+    frame = Frame(go_to_singularity(index + 1).apply(open_state(PRESETS["buildable"])))
+    (step,) = (each for each in SINGULAR.steps if each.title == "See what it costs to be near")
+    assert "Amplification: infinite; asked: above 100" in step.readings(frame, frame)
+
+
 def test_step_that_a_design_cannot_do_is_told_with_what_is_lacking() -> None:
     # Base and platform are nearly lines, so that home has a large amplification.
     design = PRESETS["paper-optimal"].with_variables((7.0, 0.002, 3.0, 0.002, 2.0, 4.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import string
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import msgspec
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from hypothesis import given
 from sample_states import Sample, rich_state, samples, states_of
 
+from explorer.app.features.paths.state import Paths, Stop
 from explorer.app.features.sharing.links import (
     LONGEST,
     Link,
@@ -19,11 +21,14 @@ from explorer.app.features.sharing.links import (
     encode_link,
     open_link,
 )
+from explorer.app.state.actions import Set
 from explorer.app.state.state import State, open_state
+from explorer.app.state.view import LengthName, View
 from explorer.errors import InputError
 from explorer.files.fragments import SCHEMA, encode_fragment
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Tolerances
+from explorer.mechanism.pose import Pose
 
 DATA = Path(__file__).parent.parent / "data"
 OPTIMAL = open_state(PRESETS["paper-optimal"])
@@ -58,6 +63,25 @@ def test_link_of_the_first_schema_is_read() -> None:
 def test_name_of_a_preset_is_a_link_to_it() -> None:
     for design in PRESETS.values():
         assert open_link(decode_link(design.name)).apply(OPTIMAL) == open_state(design)
+
+
+@pytest.mark.parametrize("linked", get_args(LengthName))
+@pytest.mark.parametrize("shown", get_args(LengthName))
+def test_path_stays_in_place_where_page_or_link_is_in_millimetres(
+    shown: LengthName, linked: LengthName
+) -> None:
+    stops = Stop(OPTIMAL.pose), Stop(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)))
+    state = Set("paths.stops", stops).apply(Set("view.lengths", shown).apply(OPTIMAL))
+    design = msgspec.structs.replace(OPTIMAL.design, unit_mm=25.4)
+    link = Link.of(open_state(design, view=View(lengths=linked)))
+    opened = open_link(link).apply(state)
+    assert opened.view == link.view
+    scale = 1.0 if shown == linked == "design units" else state.design.unit_mm / design.unit_mm
+    for before, after in zip(Paths.of(state).stops, Paths.of(opened).stops, strict=True):
+        assert isinstance(before.at, Pose)
+        assert isinstance(after.at, Pose)
+        expected = scale * np.array(before.at.position)
+        np.testing.assert_allclose(after.at.position, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("state", [OPTIMAL, rich_state()])

@@ -585,7 +585,7 @@ def test_poses_and_pauses_are_taken_from_a_table() -> None:
     for data, words in (
         (b"x,y\n1,2\n", "no column z"),
         (b"x,y,z\n" + 51 * b"1,2,3\n", "at most 50"),
-        (b"x,y,z,time_s\n1,2,3,0\n", "a path in time already"),
+        (b"x,y,z,time_s\n" + 51 * b"1,2,3,0\n", "a path in time already"),
     ):
         with pytest.raises(InputError, match=words):
             stops_in_table(state, data, "pick.csv")
@@ -800,7 +800,7 @@ def test_change_of_the_law_keeps_the_place_on_the_path() -> None:
 def test_law_that_there_is_not_is_told_and_the_path_takes_a_time_to_watch() -> None:
     state = Set("paths.law", "shortest").apply(go().apply(with_ends(open_state(OPTIMAL), 1, 5)))
     assert path_of(state).trajectory.duration == pytest.approx(WATCH_SECONDS)
-    assert "In the time asked for there is no law" in path_title(state, None)
+    assert "Takes 8 s, slow enough to watch, since it cannot be" in path_title(state, None)
     assert str(path_of(state).problem) in path_title(state, None)
     paused = replace(path_of(state), pauses=(0.6, 0.6))
     asked = Set("paths.law", "duration").apply(

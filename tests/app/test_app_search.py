@@ -77,6 +77,8 @@ def test_every_verdict_is_declared_with_its_meaning_and_found(
         ("save", "Designs › Design › Save"),
         ("free ball", "Singularity › Singularity-free ball"),
         ("delta2", "δ2 (glossary)"),
+        ("via point", "Via point (glossary)"),
+        ("pick and place", "Via point (glossary)"),
         ("warn below", "Warn below (mm)"),
         ("singularty", "Singularity"),
     ],

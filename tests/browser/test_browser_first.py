@@ -6,10 +6,11 @@ import re
 from contextlib import closing
 
 from playwright.sync_api import Browser, expect
-from tab import Tab
+from tab import NOTICE, Tab
 
 from explorer.app.features.paths.actions import go
 from explorer.app.features.paths.state import Stop
+from explorer.app.screenshot import HOLD
 from explorer.app.server import Running
 from explorer.app.state.actions import Set
 from explorer.mechanism.design_file import PRESETS
@@ -55,7 +56,25 @@ REACHED = {
     *("Pose", "Design", "Machine"),
     *("Singularity", "Workspace", "Tilt", "Loads", "Prototype"),
 }
+# The colour of a notice, and the one that tells something without a warning.
+NOTE_COLOURS = """(notice) => {
+    const [own, root] = [notice, document.documentElement].map((each) => getComputedStyle(each));
+    return ["--notification-color", "--mantine-color-blue-filled"].map((name, at) =>
+        [own, root][at].getPropertyValue(name));
+}"""
 HIGHER = Pose((10.0, 5.0, 11.0), PRESETS["paper-optimal"].home_pose.quaternion)
+
+
+def test_notice_of_a_browser_without_graphics_card_is_blue(tab: Tab, browser: Browser) -> None:
+    context = browser.new_context()
+    with closing(context):
+        context.add_init_script(HOLD)
+        page = context.new_page()
+        page.goto(tab.running.url)
+        notice = page.locator(NOTICE, has_text="Drawn without a graphics card")
+        notice.wait_for()
+        own, blue = notice.evaluate(NOTE_COLOURS)
+        assert own == blue != ""
 
 
 def test_first_screen_is_short_for_the_keyboard_and_stays_as_it_was_opened(

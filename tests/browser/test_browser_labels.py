@@ -297,31 +297,35 @@ def test_view_along_an_axis_has_no_perspective_until_it_is_turned(wide: Tab) -> 
     assert page.evaluate(IS_PARALLEL)
 
 
+@pytest.mark.parametrize("lengths", ["mm", "design units"])
 @pytest.mark.parametrize(
     "factor", [47.0, *(pytest.param(f, marks=pytest.mark.long) for f in (0.003, 1.0))]
 )
-def test_scale_bar_has_the_length_that_it_names_at_any_distance(wide: Tab, factor: float) -> None:
+def test_scale_bar_has_the_length_that_it_names_at_any_distance(
+    wide: Tab, factor: float, lengths: str
+) -> None:
     design = scaled_design(PRESETS["paper-optimal"], factor)
     wide.running.page.session.do(open_design(design))
+    wide.running.page.session.do(Set("view.lengths", lengths))
     assert wait_until_drawn(wide.running.page)
-    placed = Placed(Frame(wide.state))
+    placed, unit = Placed(Frame(wide.state)), wide.state.unit
     wide.look_from("isometric")
     scale = wide.page.evaluate(SCALE)
-    assert scale["text"] == f"1 square = {placed.square_mm:,.6g} mm"
+    assert scale["text"] == f"1 square = {placed.square_shown:,.6g} {unit.name}"
     wide.look_from("front")
     scale = wide.page.evaluate(SCALE)
     a1, a2 = (in_scene(wide, placed.points[name]) for name in ("a1", "a2"))
-    pixels_per_mm = (a2[0] - a1[0]) / (design.unit_mm * placed.frame.snapshot.points.a2[0])
-    millimetres = float(scale["text"].removesuffix(" mm").replace(",", ""))
-    assert scale["length"] == pytest.approx(millimetres * pixels_per_mm, rel=1e-3)
+    pixels = (a2[0] - a1[0]) / unit.convert(float(placed.frame.snapshot.points.a2[0]))
+    length = float(scale["text"].removesuffix(f" {unit.name}").replace(",", ""))
+    assert scale["length"] == pytest.approx(length * pixels, rel=1e-3)
     assert 30.0 <= scale["length"] <= 100.0
-    assert f"{millimetres:e}"[0] in "125"
+    assert f"{length:e}"[0] in "125"
     # Nearer, the bar is about as long and stands for less.
     wide.page.evaluate("window.__viserMutable.cameraControl.dollyTo(3, false)")
     wide.wait_for(lambda: wide.page.evaluate(SCALE)["text"] != scale["text"], "another bar")
     wide.settle()
     closer = wide.page.evaluate(SCALE)
-    assert float(closer["text"].removesuffix(" mm").replace(",", "")) < millimetres
+    assert float(closer["text"].removesuffix(f" {unit.name}").replace(",", "")) < length
     assert 30.0 <= closer["length"] <= 100.0
     # It is whole, or not there.
     wide.resize((683, 384))

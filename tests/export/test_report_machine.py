@@ -20,7 +20,7 @@ from explorer.export.pose_tables import parse_table, read_poses
 from explorer.export.report.data import ReportData
 from explorer.export.report.workspace import worst_payload_force
 from explorer.find.check import check_requirement
-from explorer.find.requirement import Requirement
+from explorer.find.requirement import Requirement, decode_requirement
 from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.mechanism.design import JOINTS
@@ -253,6 +253,12 @@ def test_report_begins_with_the_requirement_and_its_check() -> None:
     section = section_of(page, "Requirement")
     assert next(page.all("h2")).text == "Requirement"
     assert "mine: a box of 200 × 150 × 100 mm" in section.text
+    # The check and the table are of the same box.
+    assert "at its centre, turned by −63° about z" in section.text
+    assert "before it is turned by −63° about z" in section_of(page, "Mechanism").text
+    assert "--requirement requirement.json" in page.one(id="commands").text
+    again = decode_requirement(page.one(id="requirement").text.encode(), "report")
+    assert again == needed
     check, rows = check_requirement(design, needed), table_of(section, "The check of the design")
     assert [*rows] == [each.words for each in check.demands]
     for each in check.demands:

@@ -17,6 +17,7 @@ from explorer.export.drawings.mechanism import WIDTH, cover_drawing, svg_drawing
 from explorer.export.report import mechanism, workspace
 from explorer.export.report.data import ReportData
 from explorer.files.packaged import packaged_file, versions
+from explorer.find.requirement import encode_requirement
 from explorer.measures.blocks import commands
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
@@ -27,6 +28,7 @@ from explorer.optimise.problem import REACH, YAW
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
+REQUIREMENT_FILE = "requirement.json"
 # The height of the charts of the search, and the space around each.
 HEIGHT = 190.0
 LEFT, RIGHT, TOP, BOTTOM = 52.0, 14.0, 26.0, 36.0
@@ -198,6 +200,8 @@ def _reproduction(data: ReportData) -> Iterator[Element]:
     where: tuple[Piece, ...] = ("The design is a preset of the explorer. ",)
     if name == commands.DESIGN_FILE:
         where = ("Save the file below as ", element("code", name), ". ")
+    if data.requirement is not None:
+        where += ("Save the requirement below as ", element("code", REQUIREMENT_FILE), ". ")
     yield paragraph(*where, "These commands give the same figures:")
     yield element("pre", "\n".join(_commands(data, shlex.quote(name))), id="commands")
     columns = {"this report": versions()}
@@ -218,6 +222,9 @@ def _reproduction(data: ReportData) -> Iterator[Element]:
     yield element("h3", "Design file")
     yield paragraph("SHA-256 ", element("code", _hash(data), id="design-hash"), class_="dim")
     yield element("pre", encode_design(filed).decode(), id="design")
+    if data.requirement is not None:
+        yield element("h3", "Requirement file")
+        yield element("pre", encode_requirement(data.requirement).decode(), id="requirement")
 
 
 def _commands(data: ReportData, source: str) -> Iterator[str]:
@@ -225,8 +232,9 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     turned = "" if data.is_home else f" --quaternion {' '.join(map(repr, pose.quaternion))}"
     legs = " --interference" if isinstance(data.accessible, AccessibleWorkspace) else ""
     record = "" if data.record is None else " --record record.json"
+    needed = "" if data.requirement is None else f" --requirement {REQUIREMENT_FILE}"
     at = commands.pose_options(design, pose)
-    yield f"explorer report --design {source}{at}{record} --out report.html"
+    yield f"explorer report --design {source}{at}{record}{needed} --out report.html"
     yield f"explorer workspace --design {source}{turned} --hull{legs}"
     yield commands.pose_command("singularity", design, pose)
     yield commands.pose_command("interference", design, pose)

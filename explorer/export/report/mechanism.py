@@ -53,6 +53,8 @@ def requirement_section(data: ReportData) -> Iterator[Element]:
     yield element("h2", "Requirement")
     edges, load = " × ".join(map(format_number, needed.box_mm)), needed.payload
     what = f"{needed.name}: a box of {edges} mm for the tool, with home at its centre"
+    turn = format_number(data.design.required_yaw)
+    what += f", turned by {turn}° about z" if data.design.required_yaw else ""
     what += f", at every tilt up to {format_number(needed.tilt_deg)}°" if needed.tilt_deg else ""
     what += f", with {format_number(load.mass_kg)} kg" if load.mass_kg else ""
     what += f" and a force of {format_number(load.force_n)} N at the tool" if load.force_n else ""
@@ -169,6 +171,10 @@ def _required_box(data: ReportData) -> Iterator[Element]:
     ]
     heads = ("of the tool", "from, units", "to, units", "from, mm", "to, mm")
     yield markup.table(heads, rows, "<>>>>", "Required box")
+    if data.design.required_yaw:
+        turn = format_number(data.design.required_yaw)
+        words = f"The table has the box before it is turned by {turn}° about z, about its centre."
+        yield markup.paragraph(words)
 
 
 def singularity_section(data: ReportData) -> Iterator[Element]:

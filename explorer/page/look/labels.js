@@ -218,28 +218,29 @@ window.explorer.labels ??= (() => {
       );
     }
   };
-  const lengthText = (millimetres) =>
-    `${millimetres.toLocaleString("en", { maximumSignificantDigits: 6 })} mm`;
+  const lengthText = (size, unit) =>
+    `${size.toLocaleString("en", { maximumSignificantDigits: 6 })} ${unit}`;
   // What tells the size of things: a bar where it is the same at every depth, and else the size of
   // the squares on the ground.
   const scaleOf = ({ camera, width, height }) => {
     const label = nodes("LabelMessage").find(({ name }) => name === SCALE);
     const grid = nodes("GridMessage")[0];
     if (!label || !grid || width < AXES.room) return null;
-    let millimetres = Number(label.props.text);
+    const [text, unit] = label.props.text.split(" ");
+    let size = Number(text);
     if (!window.explorer.projection.isParallel(camera)) {
-      return { length: 0, text: `1 square = ${lengthText(millimetres)}` };
+      return { length: 0, text: `1 square = ${lengthText(size, unit)}` };
     }
     let length = 0.5 * height * camera.projectionMatrix.elements[5] * grid.props.cell_size;
     // A length of 1, 2 or 5 times a power of ten, as that of a square is.
-    const digit = () => Number(millimetres.toExponential(6)[0]);
+    const digit = () => Number(size.toExponential(6)[0]);
     const times = (factor) => {
-      millimetres *= factor;
+      size *= factor;
       length *= factor;
     };
     while (length < BAR[0]) times(digit() === 2 ? 2.5 : 2);
     while (length > BAR[1]) times(digit() === 5 ? 0.4 : 0.5);
-    return { length, text: lengthText(millimetres) };
+    return { length, text: lengthText(size, unit) };
   };
   const drawScale = (pen, view, look) => {
     const scale = scaleOf(view);

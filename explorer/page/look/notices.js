@@ -1,5 +1,5 @@
-// Makes viser's notice that there is no graphics card a short one, which closes by itself and is shown
-// once in a browser.
+// Makes viser's notice that there is no graphics card a short one, blue as all that only tells
+// something, which closes by itself and is shown once in a browser.
 window.explorer.notices ??= (() => {
   const { clock, recall, keep } = window.explorer;
   const ID = "webgl-software-rendering",
@@ -14,6 +14,7 @@ window.explorer.notices ??= (() => {
   else {
     notice.querySelector(".mantine-Notification-title").textContent = WORDS;
     notice.querySelector(".mantine-Notification-description").style.display = "none";
+    notice.style.setProperty("--notification-color", "var(--mantine-color-blue-filled)");
     clock.after(LASTS, close);
   }
   keep(KEY, "seen");

@@ -28,7 +28,7 @@ from explorer.mechanism.design_file import typical_machine
 from explorer.page.widgets.assigning import Update
 
 DROP = "Drop a table of joints and of what was measured there on the page (CSV)."
-NAMES = {"measured": "Measured table", "targets": "Places of the targets"}
+NAMES = {"measured": "Measured table", "targets": "Target positions"}
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,8 @@ class CalibrationPanel:
 def open_table(field: str, _: Services, data: bytes, name: str) -> tuple[Action, str]:
     """Return the action that takes a table, "measured" or "targets"."""
     action = Set(f"calibrated.{field}", decode_text(data, "cp1252"), NAMES[field], name)
-    return action, f"{NAMES[field]}; the tab Loads has the machine."
+    words = f"{NAMES[field]} of the calibration, in the tab Loads"
+    return action, f"{words}. Poses of a path are opened in the tab Paths, by Poses from a file."
 
 
 CALIBRATION = Feature(

@@ -120,7 +120,8 @@ def _to_verdict(state: State, title: str) -> State:
 
 def _amplification(now: Frame, _: Frame) -> float:
     """Return one over the smallest singular value of J with lengths over the reach."""
-    least = float(now.snapshot.smallest_singular_value)
+    # Rounding leaves some of it in a singular pose.
+    least = 0.0 if now.snapshot.is_singular else float(now.snapshot.smallest_singular_value)
     return 1.0 / least if least > 0.0 else math.inf
 
 

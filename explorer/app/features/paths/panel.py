@@ -252,8 +252,7 @@ def path_title(state: State, loads: PathLoads | None, clear: str = "") -> str:
     duration = format_number(journey.trajectory.duration, 3)
     times = f"Takes {duration} s" + (f", played {slow}" if (slow := slow_words(state)) else "")
     if journey.problem is not None:
-        what = "In the time asked for there is no law, so it is slow enough to watch"
-        times = f"{times}. {what}: {journey.problem}"
+        times += f", slow enough to watch, since it cannot be as asked for: {journey.problem}"
     look = "" if journey.problem is None else "ex-close"
     return markup.box(
         f'<div class="ex-line">{play}<span class="ex-cut ex-fill" title="{title}">{title}</span>'

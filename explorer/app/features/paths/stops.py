@@ -170,12 +170,12 @@ def stops_in_table(state: State, data: bytes, name: str) -> Act:
     """
     table = parse_table(Path(name).name, data, state.design.unit_mm)
     at = "tool" if "tool_x" in table.columns else "b4"
+    poses, pauses = read_corners(table, state.design, state.pose.rotation, at)
     if len(table.rows) > MOST_STOPS:
         raise InputError(
             f"{name} has {len(table.rows)} poses, and a path on the page at most {MOST_STOPS}: "
             "explorer drives takes longer ones"
         )
-    poses, pauses = read_corners(table, state.design, state.pose.rotation, at)
     stops = tuple(map(Stop, poses, pauses))
     left_out = f", without its columns {', '.join(table.skipped)}" if table.skipped else ""
     return set_stops(stops, None, f"Poses of the path from {name}: {len(stops)}{left_out}")

@@ -75,9 +75,13 @@ def decode_link(fragment: str) -> Link:
 def open_link(state: State, link: Link) -> State:
     """Open the design of a link in its pose, with its view and requirement.
 
+    Other lengths, as those of the next path, stay in mm, unless both views are in design units.
+
     The action is refused while the design is being optimised.
     """
     state.check_free()
-    kept = parts_kept_on_open(state.in_unit_of(link.design)) | {"view": link.view}
+    view = state.view if state.view.lengths == "mm" else link.view
+    scaled = replace(state, view=view).in_unit_of(link.design)
+    kept = parts_kept_on_open(scaled) | {"view": link.view}
     opened = replace(open_state(link.design, link.pose), **kept)
     return with_value(opened, Required.in_state, link.required)

@@ -230,8 +230,8 @@ class Ground(ScenePart):
         """Yield the updates that draw the ground of this frame."""
         view, lowest = placed.frame.state.view, ground_of(placed)
         yield from show(view.grid, self._grid, self._scale)
-        # Of the sides of the squares, in millimetres.
-        yield self._scale, "text", f"{placed.square_mm:.6g}"
+        # Of the sides of the squares, which the page draws.
+        yield self._scale, "text", f"{placed.square_shown:.6g} {placed.frame.state.unit.name}"
         yield self._grid, "cell_size", placed.square
         yield self._grid, "section_size", 5.0 * placed.square
         yield self._grid, "position", (0.0, 0.0, lowest - GRID_BELOW)
