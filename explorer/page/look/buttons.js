@@ -71,9 +71,7 @@ window.explorer.buttons ??= (() => {
   const pointAt = (target) => restOn("pointer", target?.closest?.("[data-hover]"));
   addEventListener("pointerover", ({ target }) => pointAt(target));
   // The pointer has left the window, or a finger the screen.
-  addEventListener("pointerout", ({ relatedTarget }) => {
-    if (!relatedTarget) pointAt(null);
-  });
+  addEventListener("pointerout", ({ relatedTarget }) => relatedTarget || pointAt(null));
   for (const type of ["pointermove", "pointerdown"]) {
     capture(type, ({ target }) => {
       if (moved === "pointer") return;

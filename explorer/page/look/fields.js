@@ -153,9 +153,7 @@ window.explorer.fields ??= (() => {
     typing.isPending = typing.isEdited = true;
   });
   // The page would turn every comma into a point and report the number itself.
-  capture("paste", (event) => {
-    if (isField(event.target)) event.stopPropagation();
-  });
+  capture("paste", (event) => isField(event.target) && event.stopPropagation());
   capture("beforeinput", (event) => {
     const { target, inputType } = event;
     if (!isField(target)) return;
@@ -164,9 +162,7 @@ window.explorer.fields ??= (() => {
     // The explorer may have written another number since.
     if (typing && typing.field === target) hold();
   });
-  capture("compositionend", ({ target }) => {
-    if (typing && typing.field === target && typing.isPending) wait();
-  });
+  capture("compositionend", ({ target }) => typing?.field === target && typing.isPending && wait());
   document.addEventListener("selectionchange", () => {
     if (!typing || typing.isReplacing) return;
     if (typing.field.value === typing.text) choose();

@@ -23,9 +23,7 @@ window.explorer.graphics ??= (() => {
       getParameter: (name) => parameters[name] ?? 0,
       getShaderPrecisionFormat: () => ({ precision: 23, rangeMin: 127, rangeMax: 127 }),
     };
-    return new Proxy(answers, {
-      get: (_, name) => answers[name] ?? names[name] ?? (() => null),
-    });
+    return new Proxy(answers, { get: (_, name) => answers[name] ?? names[name] ?? (() => null) });
   };
   const prototype = HTMLCanvasElement.prototype,
     getContext = prototype.getContext;
