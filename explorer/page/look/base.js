@@ -19,3 +19,11 @@ window.explorer.tell ??= (drawing, words) => {
 };
 // Calls a function at events of a type, before what they happen to hears of them.
 window.explorer.capture ??= (type, run) => addEventListener(type, run, true);
+// All elements of a selector, as an array.
+window.explorer.all ??= (selector) => [...document.querySelectorAll(selector)];
+// An element with some properties.
+window.explorer.make ??= (tag, properties) =>
+  Object.assign(document.createElement(tag), properties);
+// Calls a function after changes of the page, of kinds that a MutationObserver knows.
+window.explorer.watch ??= (run, kinds = { childList: true }) =>
+  new MutationObserver(run).observe(document.body, { subtree: true, ...kinds });

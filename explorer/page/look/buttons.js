@@ -2,15 +2,14 @@
 // What the pointer or the focus of the keyboard rests on, [data-hover=name], is sent as a press of
 // that name with the same value, and without a value once it is left.
 window.explorer.buttons ??= (() => {
-  const { capture } = window.explorer;
+  const { all, capture, watch } = window.explorer;
   let inbox = null;
   // Two equal presses in a row must be different messages, even if they come from two pages or
   // from one page before and after it was loaded again.
   let count = Math.floor(Math.random() * 2 ** 52);
   window.explorer.press = (name, value) => {
     count += 1;
-    const text = JSON.stringify({ name, value, count });
-    window.explorer.send(inbox, text);
+    window.explorer.send(inbox, JSON.stringify({ name, value, count }));
   };
   addEventListener("click", ({ target }) => {
     const button = target.closest?.("[data-press]");
@@ -41,16 +40,14 @@ window.explorer.buttons ??= (() => {
   // the scene, which turns the camera, is sent as a press of that name.
   capture("pointerdown", ({ target }) => {
     if (target.localName === "canvas") return;
-    for (const { dataset } of document.querySelectorAll("[data-until-press]")) {
+    for (const { dataset } of all("[data-until-press]")) {
       window.explorer.press(dataset.untilPress, "");
     }
   });
   // Milliseconds between two reports of what is rested on.
   const HOVER_PAUSE = 80;
   const isThere = ({ name, value }) =>
-    [...document.querySelectorAll(`[data-hover="${name}"]`)].some(
-      (element) => element.dataset.value === value,
-    );
+    all(`[data-hover="${name}"]`).some(({ dataset }) => dataset.value === value);
   // What the pointer and the keyboard rest on; what was moved last is reported. A change of layout
   // under a resting pointer fires pointerover too, which moves nothing.
   const rested = { pointer: null, keyboard: null };
@@ -74,9 +71,7 @@ window.explorer.buttons ??= (() => {
   const pointAt = (target) => restOn("pointer", target?.closest?.("[data-hover]"));
   addEventListener("pointerover", ({ target }) => pointAt(target));
   // The pointer has left the window, or a finger the screen.
-  addEventListener("pointerout", ({ relatedTarget }) => {
-    if (!relatedTarget) pointAt(null);
-  });
+  addEventListener("pointerout", ({ relatedTarget }) => relatedTarget || pointAt(null));
   for (const type of ["pointermove", "pointerdown"]) {
     capture(type, ({ target }) => {
       if (moved === "pointer") return;
@@ -99,14 +94,13 @@ window.explorer.buttons ??= (() => {
   };
   const keepFocus = () => {
     if (!focused || focused.isConnected || document.activeElement !== document.body) return;
-    const buttons = [...document.querySelectorAll(BUTTON)];
-    buttons.find((button) => isSame(button, focused))?.focus({ preventScroll: true });
+    const button = all(BUTTON).find((each) => isSame(each, focused));
+    button?.focus({ preventScroll: true });
   };
-  const followMarkup = () => {
+  watch(() => {
     keepFocus();
     dropRested();
-  };
-  new MutationObserver(followMarkup).observe(document.body, { childList: true, subtree: true });
+  });
   return (uuid) => {
     inbox = uuid;
   };

@@ -1,16 +1,14 @@
 // Says since when the explorer does not answer, until it does, and marks the numbers meanwhile: the
 // connection is closed, or the explorer is silent and leaves questions of the page unanswered.
 window.explorer.connection ??= (() => {
-  const { clock, send, socket } = window.explorer;
+  const { clock, make, send, socket } = window.explorer;
   // Milliseconds between two looks, and the number of looks in a silence after which the page asks,
   // tells, and connects anew, which it does again after as many more.
   const PAUSE = 2500,
     ASK = 2,
     TELL = 5,
     CONNECT = 12;
-  const message = document.createElement("div");
-  message.className = "ex-lost";
-  message.setAttribute("role", "alert");
+  const message = make("div", { className: "ex-lost", role: "alert" });
   // Id of the number field of this tab that takes questions, and whether the work is saved.
   let inbox = null,
     isSaved = false;

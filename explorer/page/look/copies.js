@@ -4,8 +4,7 @@ window.explorer.copies ??= async (text) => {
   try {
     await navigator.clipboard.writeText(text);
   } catch {
-    const field = document.createElement("textarea");
-    field.value = text;
+    const field = window.explorer.make("textarea", { value: text });
     document.body.append(field);
     field.select();
     document.execCommand("copy");

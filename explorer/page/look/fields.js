@@ -3,7 +3,7 @@
 window.explorer.fields ??= (() => {
   // Milliseconds of rest after which a typed number is entered.
   const PAUSE = 700;
-  const { capture, clock } = window.explorer;
+  const { capture, clock, make } = window.explorer;
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   const { setSelectionRange } = HTMLInputElement.prototype;
   const isField = (it) => it instanceof HTMLInputElement && it.inputMode === "decimal";
@@ -40,13 +40,10 @@ window.explorer.fields ??= (() => {
     const allowed = Number.isFinite(ofUnits(unit))
       ? `length: type a number in ${unit}, such as 0.3, or one with its unit: 3 mm, 2 cm, 1 in, 4 units`
       : "number: type one such as 0.3 or 0,3";
-    const note = document.createElement("div"),
-      { left, bottom } = field.getBoundingClientRect();
-    note.className = "ex-refusal";
-    note.setAttribute("role", "alert");
-    note.textContent = `“${field.value.slice(0, 20)}” is no ${allowed}.`;
-    note.style.setProperty("--left", `${Math.min(left, innerWidth - 270)}px`);
-    note.style.setProperty("--top", `${bottom + 4}px`);
+    const { left, bottom } = field.getBoundingClientRect(),
+      textContent = `“${field.value.slice(0, 20)}” is no ${allowed}.`,
+      note = make("div", { className: "ex-refusal", role: "alert", textContent });
+    note.style.cssText = `--left: ${Math.min(left, innerWidth - 270)}px; --top: ${bottom + 4}px`;
     document.body.append(note);
     clock.after(LIFE, () => note.remove());
   };
@@ -128,18 +125,6 @@ window.explorer.fields ??= (() => {
     write.call(typing.field, typing.before);
     choose();
   };
-  // viser ignores keys pressed in fields. Its commands go by the key, its camera by the place alone.
-  const passToPage = ({ key, ctrlKey, metaKey, shiftKey }) => {
-    const init = { key, ctrlKey, metaKey, shiftKey, bubbles: true };
-    document.documentElement.dispatchEvent(new KeyboardEvent("keydown", init));
-  };
-  // A field takes the focus back with its next number if its page is not told of the focusout.
-  const refuseFocus = (field) => {
-    field.focus = () => {};
-  };
-  const acceptFocus = (field) => {
-    delete field.focus;
-  };
   const startTyping = (field) => {
     document.querySelector(".ex-refusal")?.remove();
     // The page would set the caret with each number.
@@ -151,14 +136,12 @@ window.explorer.fields ??= (() => {
   capture("focusin", ({ target }) => {
     typing = null;
     if (!isField(target)) return;
-    acceptFocus(target);
+    delete target.focus;
     startTyping(target);
   });
   capture("input", (event) => {
     if (!isField(event.target)) return;
-    if (!typing || typing.field !== event.target) {
-      startTyping(event.target);
-    }
+    if (typing?.field !== event.target) startTyping(event.target);
     if (typing.isReplacing) return;
     event.stopPropagation();
     wait();
@@ -170,9 +153,7 @@ window.explorer.fields ??= (() => {
     typing.isPending = typing.isEdited = true;
   });
   // The page would turn every comma into a point and report the number itself.
-  capture("paste", (event) => {
-    if (isField(event.target)) event.stopPropagation();
-  });
+  capture("paste", (event) => isField(event.target) && event.stopPropagation());
   capture("beforeinput", (event) => {
     const { target, inputType } = event;
     if (!isField(target)) return;
@@ -181,9 +162,7 @@ window.explorer.fields ??= (() => {
     // The explorer may have written another number since.
     if (typing && typing.field === target) hold();
   });
-  capture("compositionend", ({ target }) => {
-    if (typing && typing.field === target && typing.isPending) wait();
-  });
+  capture("compositionend", ({ target }) => typing?.field === target && typing.isPending && wait());
   document.addEventListener("selectionchange", () => {
     if (!typing || typing.isReplacing) return;
     if (typing.field.value === typing.text) choose();
@@ -213,9 +192,7 @@ window.explorer.fields ??= (() => {
     }
     // The page's field would act on a text that it does not know.
     const isTyped = key.length === 1 && !event.ctrlKey && !event.metaKey;
-    if (isTyped || ["Backspace", "Delete", "ArrowLeft", "ArrowRight"].includes(key)) {
-      event.stopPropagation();
-    }
+    if (isTyped || /^(Backspace|Delete|ArrowLeft|ArrowRight)$/.test(key)) event.stopPropagation();
   });
   // This runs before the field loses the focus, since a field that gets a number takes it back.
   capture("pointerdown", ({ target }) => {
@@ -223,7 +200,7 @@ window.explorer.fields ??= (() => {
     else if (typing && typing.isPending) finish();
     // The arrows of a field need its focus.
     const field = target.closest?.(".mantine-NumberInput-root")?.querySelector("input");
-    if (field) acceptFocus(field);
+    if (field) delete field.focus;
   });
   capture("change", (event) => {
     if (!typing || typing.field !== event.target || !typing.isPending) return;
@@ -233,10 +210,11 @@ window.explorer.fields ??= (() => {
   capture("focusout", (event) => {
     if (!typing || typing.field !== event.target) return;
     if (typing.isPending) finish();
-    // The page would clamp the number to the range, although the range is about to follow it.
+    // The page would clamp the number to the range, although the range is about to follow it. The
+    // field, of whose focusout it is not told, would take the focus back with its next number.
     if (typing.isEdited) {
       event.stopPropagation();
-      refuseFocus(typing.field);
+      typing.field.focus = () => {};
     }
     typing = null;
   });
@@ -248,9 +226,7 @@ window.explorer.fields ??= (() => {
     line = isLine(target) ? { field: target, before: target.value } : null;
   });
   capture("input", (event) => {
-    if (line && line.field === event.target && !/\S$/.test(line.field.value)) {
-      event.stopPropagation();
-    }
+    if (line?.field === event.target && !/\S$/.test(event.target.value)) event.stopPropagation();
   });
   capture("keydown", (event) => {
     if (event.key !== "Enter" || event.isComposing || !isLine(event.target)) return;
@@ -260,7 +236,7 @@ window.explorer.fields ??= (() => {
   // What these keys do for the whole page they do wherever the focus is; text that is being typed is
   // the browser's to undo.
   capture("keydown", (event) => {
-    const { target, key, ctrlKey, metaKey, isTrusted, defaultPrevented } = event;
+    const { target, key, ctrlKey, metaKey, shiftKey, isTrusted, defaultPrevented } = event;
     if (!isTrusted || defaultPrevented || !(ctrlKey || metaKey) || !/^[zys]$/i.test(key)) return;
     if (!/s/i.test(key)) {
       const isTyped = line?.field === target && target.value !== line.before;
@@ -268,7 +244,9 @@ window.explorer.fields ??= (() => {
     }
     event.preventDefault();
     event.stopPropagation();
-    passToPage(event);
+    // viser ignores keys pressed in fields. Its commands go by the key, its camera by the place alone.
+    const init = { key, ctrlKey, metaKey, shiftKey, bubbles: true };
+    document.documentElement.dispatchEvent(new KeyboardEvent("keydown", init));
   });
   capture("focusout", ({ target }) => {
     if (!line || line.field !== target) return;

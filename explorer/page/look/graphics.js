@@ -3,9 +3,7 @@ window.explorer.graphics ??= (() => {
   const MISSING =
     "The scene needs WebGL: switch on graphics acceleration in the settings of the browser, and load the page again. All else works without it.";
   const LOST = "The browser has lost its graphics. The scene is drawn again once it has them back.";
-  const message = document.createElement("p");
-  message.className = "ex-undrawn";
-  message.setAttribute("role", "status");
+  const message = window.explorer.make("p", { className: "ex-undrawn", role: "status" });
   const tell = (words) => {
     message.textContent = words;
     document.body.append(message);
@@ -25,9 +23,7 @@ window.explorer.graphics ??= (() => {
       getParameter: (name) => parameters[name] ?? 0,
       getShaderPrecisionFormat: () => ({ precision: 23, rangeMin: 127, rangeMax: 127 }),
     };
-    return new Proxy(answers, {
-      get: (_, name) => answers[name] ?? names[name] ?? (() => null),
-    });
+    return new Proxy(answers, { get: (_, name) => answers[name] ?? names[name] ?? (() => null) });
   };
   const prototype = HTMLCanvasElement.prototype,
     getContext = prototype.getContext;

@@ -26,9 +26,7 @@ window.explorer.holds ??= (() => {
   };
   const pause = () => {
     const before = changes;
-    const endIfStill = () => {
-      if (changes === before) end();
-    };
+    const endIfStill = () => changes === before && end();
     clock.atFrame(() => clock.after(LATE_MILLISECONDS, endIfStill));
   };
   const release = () => {
@@ -48,21 +46,15 @@ window.explorer.holds ??= (() => {
     if (event.buttons & 1) goOn();
     else release();
   });
-  capture("pointerup", (event) => {
-    if (event.isPrimary && event.button === 0) release();
-  });
+  capture("pointerup", (event) => event.isPrimary && event.button === 0 && release());
   // What a key does belongs to no press that is over.
-  capture("keydown", () => {
-    if (!isHeld) end();
-  });
+  capture("keydown", () => isHeld || end());
   // A touch may go on after the browser has cancelled its pointer.
   capture("pointercancel", (event) => {
     if (event.isPrimary && event.pointerType !== "touch") release();
   });
   for (const name of ["touchend", "touchcancel"]) {
-    capture(name, ({ touches }) => {
-      if (!touches.length) release();
-    });
+    capture(name, ({ touches }) => touches.length || release());
   }
   // A release in another window is never reported; a pointer that is still held moves again later.
   addEventListener("blur", pause);

@@ -51,6 +51,10 @@ window.explorer.labels ??= (() => {
   const SCALE = "/ground/scale";
 
   const page = () => window.__viserMutable;
+  const vector = (...parts) =>
+    page()
+      .camera.position.clone()
+      .set(...parts);
   const theme = () =>
     THEMES[document.documentElement.dataset.mantineColorScheme === "dark" ? "dark" : "light"];
   const css = (rgb) => `rgb(${rgb.map(Math.round).join(" ")})`;
@@ -66,27 +70,19 @@ window.explorer.labels ??= (() => {
   const placeOf = (name) => {
     const parent = page().nodeRefFromName[name.slice(0, name.lastIndexOf("/"))];
     const position = page().nodePoseData[name]?.position ?? [0, 0, 0];
-    return (
-      parent &&
-      page()
-        .camera.position.clone()
-        .set(...position)
-        .applyMatrix4(parent.matrixWorld)
-    );
+    return parent && vector(...position).applyMatrix4(parent.matrixWorld);
   };
   // A view is a camera and the size, in pixels, of what it draws. Pixels of a scene unit at a place:
   const unitAt = ({ camera, height }, place) => {
     const { x, y, z } = place.clone().applyMatrix4(camera.matrixWorldInverse);
-    const [here, above] = [y, y + 1].map((each) =>
-      place.clone().set(x, each, z).applyMatrix4(camera.projectionMatrix),
-    );
-    return 0.5 * height * (above.y - here.y);
+    const shareAt = (each) => vector(x, each, z).applyMatrix4(camera.projectionMatrix).y;
+    return 0.5 * height * (shareAt(y + 1) - shareAt(y));
   };
   // A place behind the camera has no pixels.
   const pixelsOf = ({ camera, width, height }, place) => {
     const { x, y, z } = place.clone().applyMatrix4(camera.matrixWorldInverse);
     if (z > 0 && !window.explorer.projection.isParallel(camera)) return null;
-    const at = place.clone().set(x, y, z).applyMatrix4(camera.projectionMatrix);
+    const at = vector(x, y, z).applyMatrix4(camera.projectionMatrix);
     return [(0.5 + 0.5 * at.x) * width, (0.5 - 0.5 * at.y) * height];
   };
 
@@ -112,8 +108,7 @@ window.explorer.labels ??= (() => {
   const handlesIn = (view) =>
     nodes("TransformControlsMessage").flatMap(({ name }) => {
       const place = page().nodeRefFromName[name]?.matrixWorld;
-      const at =
-        place && pixelsOf(view, page().camera.position.clone().setFromMatrixPosition(place));
+      const at = place && pixelsOf(view, vector(0, 0, 0).setFromMatrixPosition(place));
       return at ? [at] : [];
     });
   const layOut = (pen, view) => {
@@ -162,9 +157,9 @@ window.explorer.labels ??= (() => {
     pen.lineWidth = width;
     pen.strokeStyle = colour;
     pen.beginPath();
-    for (const [from, to] of lines) {
-      pen.moveTo(...from);
-      pen.lineTo(...to);
+    for (const [x0, y0, x1, y1] of lines) {
+      pen.moveTo(x0, y0);
+      pen.lineTo(x1, y1);
     }
     pen.stroke();
   };
@@ -176,11 +171,8 @@ window.explorer.labels ??= (() => {
     );
     if (gap > FAR) {
       // A line leads from a label that is not beside its point to it.
-      const nearest = [
-        Math.min(Math.max(x, box[0]), box[2]),
-        Math.min(Math.max(y, box[1]), box[3]),
-      ];
-      stroke(pen, 1, colour, [[x, y], nearest]);
+      const nearest = [x, y].map((at, k) => Math.min(Math.max(at, box[k]), box[k + 2]));
+      stroke(pen, 1, colour, [x, y, ...nearest]);
     }
     pen.textAlign = "left";
     write(pen, text, box[0], 0.5 * (box[1] + box[3]), colour, look.halo);
@@ -200,7 +192,7 @@ window.explorer.labels ??= (() => {
     for (const { along, axis } of axes) {
       const size = Math.hypot(along[0], along[1]);
       const tip = [x + AXES.length * along[0], y + AXES.length * along[1]];
-      stroke(pen, 2.5, COLOURS[axis], [[x, y], tip]);
+      stroke(pen, 2.5, COLOURS[axis], [x, y, ...tip]);
       pen.fillStyle = COLOURS[axis];
       pen.beginPath();
       pen.arc(...tip, 3, 0, 2 * Math.PI);
@@ -208,14 +200,8 @@ window.explorer.labels ??= (() => {
       // The name of an axis along the line of sight stands beside it.
       const away = size < 0.2 ? [-0.4, 0.4] : [along[0] / size, along[1] / size];
       const off = size < 0.2 ? 20 : 10;
-      write(
-        pen,
-        "xyz"[axis],
-        tip[0] + off * away[0],
-        tip[1] + off * away[1],
-        COLOURS[axis],
-        look.halo,
-      );
+      const [left, top] = tip.map((part, k) => part + off * away[k]);
+      write(pen, "xyz"[axis], left, top, COLOURS[axis], look.halo);
     }
   };
   const lengthText = (size, unit) =>
@@ -250,20 +236,10 @@ window.explorer.labels ??= (() => {
     const y = view.height - 14;
     pen.globalAlpha = 0.75;
     if (length) {
-      for (const [width, colour] of [
-        [1.5 + HALO, look.halo],
-        [1.5, css(look.text)],
-      ]) {
-        const right = left + length;
-        const ends = [left, right].map((x) => [
-          [x, y - 4],
-          [x, y + 4],
-        ]);
-        stroke(pen, width, colour, ...ends, [
-          [left, y],
-          [right, y],
-        ]);
-      }
+      const ends = [left, left + length].map((x) => [x, y - 4, x, y + 4]);
+      const lines = [...ends, [left, y, left + length, y]];
+      stroke(pen, 1.5 + HALO, look.halo, ...lines);
+      stroke(pen, 1.5, css(look.text), ...lines);
       left += length + 8;
     }
     pen.textAlign = "left";
@@ -298,8 +274,7 @@ window.explorer.labels ??= (() => {
     }
   };
 
-  const canvas = document.createElement("canvas");
-  Object.assign(canvas, { className: "ex-labels", ariaHidden: "true" });
+  const canvas = window.explorer.make("canvas", { className: "ex-labels", ariaHidden: "true" });
   canvas.style.cssText = "position:absolute;inset:0;pointer-events:none;color:var(--ex-ring)";
   // A picture of the scene alone hides what is not its canvas.
   canvas.style.setProperty("visibility", "visible", "important");

@@ -64,9 +64,8 @@ window.explorer.map ??= (() => {
   };
   addEventListener("pointermove", follow);
   addEventListener("pointerdown", follow);
-  new MutationObserver(() => {
-    if (found) update();
-  }).observe(document.body, { childList: true, subtree: true, attributeFilter: ["data-map"] });
+  const kinds = { childList: true, attributeFilter: ["data-map"] };
+  window.explorer.watch(() => found && update(), kinds);
   addEventListener("click", ({ target }) => {
     // A click tells whole pixels, other than the pointer that read the map.
     if (found && mapAt(target)) window.explorer.press(`${found.name}.go`, found.value);

@@ -2,7 +2,7 @@
 // its value with the unit, groups of controls, and the parts of the page. Gives the browser's tab the
 // names of design and product, and puts hints beside the panel, where they cover no control.
 window.explorer.names ??= (() => {
-  const { capture } = window.explorer;
+  const { all, capture, clock, watch } = window.explorer;
   const CONTROLS =
     "[role=slider], input:not([type=hidden]):not([type=file]):not([type=checkbox]), textarea";
   // Names of buttons by their icon.
@@ -95,14 +95,14 @@ window.explorer.names ??= (() => {
     isDue = false;
     nameTab();
     window.explorer.stops?.();
-    document.querySelectorAll(CONTROLS).forEach(nameControl);
-    document.querySelectorAll("button").forEach(nameButton);
-    document.querySelectorAll("[data-owns]").forEach(nameGroup);
+    all(CONTROLS).forEach(nameControl);
+    all("button").forEach(nameButton);
+    all("[data-owns]").forEach(nameGroup);
     for (const [selector, ...words] of PARTS_OF_PAGE) {
-      document.querySelectorAll(selector).forEach((part) => namePart(part, ...words));
+      all(selector).forEach((part) => namePart(part, ...words));
     }
     // A list of tabs has tabs alone; each of them opens the panel as this button does.
-    for (const button of document.querySelectorAll("[data-dock-bar] [data-dock-minimize]")) {
+    for (const button of all("[data-dock-bar] [data-dock-minimize]")) {
       Object.assign(button, { ariaHidden: "true", tabIndex: -1 });
     }
   };
@@ -121,34 +121,27 @@ window.explorer.names ??= (() => {
     hint.style.setProperty("--left", `${left}px`);
     hint.style.setProperty("--top", `${top}px`);
   };
-  const placeHints = () => {
-    document.querySelectorAll(".mantine-Tooltip-tooltip:not([data-beside])").forEach(placeHint);
-  };
   const nameSoon = () => {
-    if (!isDue) window.explorer.clock.after(100, nameAll);
+    if (!isDue) clock.after(100, nameAll);
     isDue = true;
-    placeHints();
+    all(".mantine-Tooltip-tooltip:not([data-beside])").forEach(placeHint);
   };
-  const changes = { childList: true, characterData: true, subtree: true };
-  new MutationObserver(nameSoon).observe(document.body, changes);
-  new MutationObserver((values) => values.forEach(({ target }) => tellValue(target))).observe(
-    document.body,
-    { subtree: true, attributeFilter: ["aria-valuenow"] },
-  );
+  watch(nameSoon, { childList: true, characterData: true });
+  const tellValues = (changes) => changes.forEach(({ target }) => tellValue(target));
+  watch(tellValues, { attributeFilter: ["aria-valuenow"] });
   nameAll();
   // What has the focus, or else the pointer, is marked in the sketch of the design variables.
   let pointed = null;
   const mark = () => {
     const words = labelOf(document.activeElement) || labelOf(pointed);
-    for (const each of document.querySelectorAll("[data-variable]")) {
+    for (const each of all("[data-variable]")) {
       each.classList.toggle("is-here", each.dataset.variable === words);
     }
   };
-  const pointAt = ({ target }) => {
+  capture("pointerover", ({ target }) => {
     pointed = target;
     mark();
-  };
-  capture("pointerover", pointAt);
+  });
   for (const event of ["focusin", "focusout"]) capture(event, mark);
   return { rowOf, unitOf };
 })();

@@ -1,33 +1,28 @@
 // Opens what [data-opens=title] names: a tab of a panel, or a dialog.
 // Closes the dialog at Escape, at a click beside it, and at its button.
 window.explorer.opens ??= (() => {
+  const { all, capture, make } = window.explorer;
   const DIALOG = "[data-floating-window][data-ex=dialog]",
     OPEN = `${DIALOG}[data-ex-open]`,
     CARD_CLOSE = "[data-ex=card] > .ex-closes";
   const ENTER = { key: "Enter", code: "Enter", bubbles: true };
-  const shade = document.createElement("div");
-  shade.className = "ex-shade";
+  const shade = make("div", { className: "ex-shade" });
   const closeDialogs = () => {
-    for (const each of document.querySelectorAll(OPEN)) {
+    for (const each of all(OPEN)) {
       const opener = document.querySelector(`[data-opens="${each.ariaLabel}"]`);
       if (each.contains(document.activeElement)) opener?.focus({ preventScroll: true });
       delete each.dataset.exOpen;
     }
     shade.remove();
   };
-  window.explorer.closeButton = (words, title) => {
-    const button = document.createElement("button");
-    Object.assign(button, { type: "button", className: "ex-closes", textContent: "×", title });
-    button.ariaLabel = words;
-    return button;
-  };
+  window.explorer.closeButton = (ariaLabel, title) =>
+    make("button", { type: "button", className: "ex-closes", textContent: "×", title, ariaLabel });
   const openDialog = (dialog, title) => {
     const wasOpen = dialog.dataset.exOpen !== undefined;
     closeDialogs();
     if (wasOpen) return;
     dialog.dataset.exOpen = "";
-    dialog.setAttribute("role", "dialog");
-    dialog.setAttribute("aria-label", title);
+    Object.assign(dialog, { role: "dialog", ariaLabel: title });
     dialog.parentElement.append(shade);
     if (!dialog.querySelector(".ex-closes")) {
       const button = window.explorer.closeButton("Close the dialog", "Close");
@@ -37,8 +32,7 @@ window.explorer.opens ??= (() => {
     dialog.querySelector("[type=search], .ex-closes").focus({ preventScroll: true });
   };
   const open = (title) => {
-    const tabs = [...document.querySelectorAll("[data-dock-tab]")];
-    const tab = tabs.find((each) => each.title === title);
+    const tab = all("[data-dock-tab]").find((each) => each.title === title);
     if (!tab) {
       // On a phone viser lists all panels, one below another.
       document.querySelector(`[role=button][aria-label$=" panel ${title}"]`)?.click();
@@ -61,7 +55,7 @@ window.explorer.opens ??= (() => {
   addEventListener("click", ({ target }) => {
     if (target.closest?.("[data-closes] [data-press]")) closeDialogs();
   });
-  window.explorer.capture("keydown", ({ key, target }) => {
+  capture("keydown", ({ key, target }) => {
     // A list in a dialog lies over it, and is closed first.
     const isOver = target.closest?.("[aria-haspopup][aria-expanded=true]");
     if (key !== "Escape" || isOver) return;

@@ -1,7 +1,7 @@
 // Gives each window of the page its place: the bar on top of the page, the drawer at the foot of the
 // scene, dialogs over it, and cards, which users move. The scene fills the room beside them.
 window.explorer.places ??= (() => {
-  const { clock } = window.explorer;
+  const { all, clock } = window.explorer;
   // Milliseconds to wait; panels take less to glide to their places.
   const REST = 300;
   const ROOT = "[data-dock-root]",
@@ -17,7 +17,7 @@ window.explorer.places ??= (() => {
     return names.length ? "card" : null;
   };
   const markWindows = () => {
-    for (const each of document.querySelectorAll(WINDOW)) {
+    for (const each of all(WINDOW)) {
       const kind = kindOf(each);
       if (kind && each.dataset.ex !== kind) each.dataset.ex = kind;
     }
@@ -51,7 +51,7 @@ window.explorer.places ??= (() => {
     if (!root) return;
     const edge = root.getBoundingClientRect().bottom;
     let isOut = false;
-    for (const card of document.querySelectorAll(`${WINDOW}[data-ex=card]`)) {
+    for (const card of all(`${WINDOW}[data-ex=card]`)) {
       const { bottom, height } = card.getBoundingClientRect();
       if (height > (heights.get(card) ?? 0) + 1 && bottom > edge + 1) isOut = true;
       heights.set(card, height);
@@ -80,19 +80,13 @@ window.explorer.places ??= (() => {
   const watch = () => {
     markWindows();
     const scene = window.__viserMutable?.canvas;
-    const around = document.querySelector(`${ROOT} > :first-child`);
-    for (const each of [
-      scene,
-      scene?.parentElement,
-      around,
-      ...document.querySelectorAll(WINDOW),
-    ]) {
+    for (const each of [scene, scene?.parentElement, ...all(`${ROOT} > :first-child, ${WINDOW}`)]) {
       if (!each || watched.has(each)) continue;
       watched.add(each);
       sizes.observe(each);
     }
   };
-  new MutationObserver(watch).observe(document.body, { childList: true, subtree: true });
+  window.explorer.watch(watch);
   return (given) => {
     titles = given;
     // Marks the page that has a bar, for the stylesheet.

@@ -37,10 +37,8 @@ window.explorer.projection ??= (() => {
   // For three.js the camera is an orthographic one only while it draws or casts a ray: what moves the
   // camera moves one with perspective, towards the target and away from it.
   const swap = (camera) => {
-    [camera.isPerspectiveCamera, camera.isOrthographicCamera] = [
-      camera.isOrthographicCamera,
-      camera.isPerspectiveCamera,
-    ];
+    camera.isPerspectiveCamera = !camera.isPerspectiveCamera;
+    camera.isOrthographicCamera = !camera.isOrthographicCamera;
   };
   // Whatever is thrown within a frame would leave three.js in the middle of it.
   const safely = (run) => {

@@ -60,9 +60,7 @@ window.explorer.search ??= (() => {
     event.stopPropagation();
     open();
   });
-  addEventListener("input", ({ target }) => {
-    if (target === fieldOf()) ask(target);
-  });
+  addEventListener("input", ({ target }) => target === fieldOf() && ask(target));
   // What the server has found for a text; another one may have been typed since.
   return (text, html) => {
     if (fieldOf()?.value !== text) return;

@@ -2,14 +2,10 @@
 // keys from button to button, and the head of a folder is a stop at which Enter and Space fold it.
 // A folder that a user has opened or closed is so again in the next page of the browser.
 window.explorer.stops ??= (() => {
+  const { all, capture } = window.explorer;
   const TOOLBAR = "[role=toolbar]",
     HEAD = ".mantine-Paper-root > .mantine-Paper-root:first-child:has(> .tabler-icon)";
-  const ARROWS = {
-    ArrowLeft: [-1, 0],
-    ArrowRight: [1, 0],
-    ArrowUp: [0, -1],
-    ArrowDown: [0, 1],
-  };
+  const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
   const itemsOf = (group) => [...group.querySelectorAll("button:enabled, [role=tab]")];
   const setStop = (items, stop) => {
     for (const each of items) each.tabIndex = each === stop ? 0 : -1;
@@ -18,11 +14,8 @@ window.explorer.stops ??= (() => {
   const STOPS = [":focus", "[aria-selected=true]", "[tabindex='0']", "*"];
   const markGroup = (group) => {
     const items = itemsOf(group),
-      at = STOPS.find((stop) => items.some((each) => each.matches(stop)));
-    setStop(
-      items,
-      items.find((each) => each.matches(at)),
-    );
+      find = (stop) => items.find((each) => each.matches(stop));
+    setStop(items, find(STOPS.find(find)));
   };
   // Folders by the words of their heads, without the unit: whether they are open.
   const KEY = "explorer.folders";
@@ -47,7 +40,7 @@ window.explorer.stops ??= (() => {
     known.add(head);
     if ((folders[nameOf(head)] ?? isOpen(head)) !== isOpen(head)) head.click();
   };
-  window.explorer.capture("click", ({ target }) => {
+  capture("click", ({ target }) => {
     const head = target.closest?.(HEAD);
     if (!head) return;
     folders[nameOf(head)] = !isOpen(head);
@@ -59,7 +52,7 @@ window.explorer.stops ??= (() => {
       const isMeant = (head) =>
         head.textContent === name && !isOpen(head) && head.checkVisibility();
       // Those of a dialog come last.
-      [...document.querySelectorAll(HEAD)].findLast(isMeant)?.click();
+      all(HEAD).findLast(isMeant)?.click();
       if (inner.length) window.explorer.unfold(inner);
     });
   // The nearest button in the direction of an arrow; one aside counts as farther.
@@ -79,7 +72,7 @@ window.explorer.stops ??= (() => {
     }
     return best;
   };
-  window.explorer.capture("keydown", (event) => {
+  capture("keydown", (event) => {
     const { target, key } = event,
       group = target.closest?.(TOOLBAR);
     if (target.matches?.(HEAD) && (key === "Enter" || key === " ")) target.click();
@@ -93,7 +86,7 @@ window.explorer.stops ??= (() => {
     if (group) setStop(itemsOf(group), target);
   });
   return () => {
-    document.querySelectorAll(`${TOOLBAR}, [role=tablist]`).forEach(markGroup);
-    document.querySelectorAll(HEAD).forEach(markHead);
+    all(`${TOOLBAR}, [role=tablist]`).forEach(markGroup);
+    all(HEAD).forEach(markHead);
   };
 })();

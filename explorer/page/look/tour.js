@@ -1,13 +1,12 @@
 // Shows the card of the tour or a lesson, turns to the tab of its step and rings the control that the
 // step names. Without a card it turns back to the tabs that were in front before.
 window.explorer.tour ??= (() => {
-  const { recall, keep } = window.explorer;
+  const { all, recall, keep, make } = window.explorer;
   const DRAWER = "[data-floating-window][data-ex=drawer]";
   const CLOSED = `${DRAWER}:has([data-dock-bar])`,
     CLOSE = `${DRAWER} [data-dock-minimize]`;
   const FRONT = "[data-dock-strip] > [aria-selected=true]:not([data-ex=dialog] *)";
-  const card = document.createElement("div");
-  Object.assign(card, { className: "ex-tour", role: "region" });
+  const card = make("div", { className: "ex-tour", role: "region" });
   // What was in front before the tour; null without a tour.
   let before = null;
   // The step whose tab is in front, and the wanted one.
@@ -28,7 +27,7 @@ window.explorer.tour ??= (() => {
     window.__viserMutable?.requestRender();
   };
   const turn = () => {
-    const titles = [...document.querySelectorAll(FRONT)].map((tab) => tab.title);
+    const titles = all(FRONT).map((tab) => tab.title);
     before ??= { titles, wasClosed: isClosed() };
     shown = wanted;
     ring(null);
