@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from explorer.measures.loads import loads
 from explorer.measures.measure import NEEDS, Case, Measure, Place
 from explorer.measures.workspace import coordinates, workspace_measures
-from explorer.mechanism.design import Design
 from explorer.numerics.computed_once import computed_once
 
 CATALOGUE: Mapping[str, Measure] = {
@@ -30,10 +29,9 @@ def measures_in(place: Place) -> dict[str, Measure]:
 
 @dataclass(frozen=True)
 class Measurements:
-    """The values of measures for one design, in design units.
+    """The values of measures for one design, in design units, or of a table, in millimetres.
 
     Attributes:
-        design: The manipulator.
         values: By name out of `CATALOGUE`; None where there is none, as of an empty workspace.
         empty_because: The limits that empty the workspace; () if it is not empty.
         nearest: The two legs that have the least clearance; None if it was not measured.
@@ -42,7 +40,6 @@ class Measurements:
         infinite: Measures whose value is infinite, as that of forces in a singular pose.
     """
 
-    design: Design
     values: Mapping[str, float | None]
     empty_because: tuple[str, ...]
     nearest: tuple[int, int] | None = None
@@ -72,25 +69,27 @@ def measure_design(case: Case, names: Iterable[str]) -> Measurements:
 
 @computed_once
 def _measure(case: Case, names: tuple[str, ...]) -> Measurements:
-    values: dict[str, float | None] = {}
-    infinite: list[str] = []
-    for name in names:
-        measure = CATALOGUE[name]
-        if not all(map(case.has, measure.needs)):
-            continue
-        value = measure.function(case)
-        values[name] = None if not math.isfinite(value) else value
-        if math.isinf(value):
-            infinite.append(name)
+    values, infinite = values_of(case, names)
     return Measurements(
-        design=case.design,
         values=values,
         empty_because=case.volume.empty_because,
         nearest=case.clearance[1] if "least_clearance" in values else None,
         demanded_margin=case.demanded_margin,
         demanded_nearest=case.demanded_clearance[1] if "demanded_clearance" in values else None,
-        infinite=tuple(infinite),
+        infinite=infinite,
     )
+
+
+def values_of(case: Case, names: Iterable[str]) -> tuple[dict[str, float | None], tuple[str, ...]]:
+    """Return the values of measures by name, None where there is none, and the infinite ones."""
+    measures = [CATALOGUE[name] for name in names]
+    values = {
+        each.name: each.function(case)
+        for each in measures
+        if all(case.has(need) for need in each.needs)
+    }
+    infinite = tuple(name for name, value in values.items() if math.isinf(value))
+    return {k: v if math.isfinite(v) else None for k, v in values.items()}, infinite
 
 
 def reason_for_missing(case: Case, measurements: Measurements) -> str:
