@@ -115,11 +115,12 @@ def encode_table(table: SixLegged) -> bytes:
     return msgspec.json.format(msgspec.json.encode(table), indent=2) + b"\n"
 
 
-def six_four_twin(design: Design, a2x: float) -> SixLegged:
+def six_four_twin(design: Design, a2x: float, longest: float | None = None) -> SixLegged:
     """Return the 6-4 twin of a design: each leg along the guide becomes two, from a1 and from a2.
 
-    The 4-4 leaves a2x, in design units, free. Every leg is at most as long as the design's longest
-    one. The modes of the twin are those of the design, by the signs of its margins.
+    The 4-4 leaves a2x free. Every leg is at most as long as the design's longest one, if no other
+    length is given; both are in design units. The modes of the twin are those of the design, by the
+    signs of its margins.
     """
     flat = {"a2": (a2x, 0.0), "a3": design.a3, "b1": design.b1}
     flat |= {"b2": (design.b2, 0.0), "b3": (design.b3, 0.0)}
@@ -130,7 +131,7 @@ def six_four_twin(design: Design, a2x: float) -> SixLegged:
         base_mm=unit * np.array(base),
         platform_mm=unit * np.array(platform),
         shortest_mm=(0.0,) * 6,
-        longest_mm=(unit * longest_leg(design),) * 6,
+        longest_mm=(unit * (longest or longest_leg(design)),) * 6,
         home=TableHome(triple(unit * np.array(home.position)), home.quaternion),
     )
 

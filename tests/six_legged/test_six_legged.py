@@ -218,20 +218,21 @@ def test_forward_kinematics_from_home_find_a_pose_nearby(table: SixLegged) -> No
 def test_griffis_and_duffy_moves_with_all_legs_locked() -> None:
     table = TABLES["Griffis and Duffy"]
     elsewhere = float(np.prod(table.home_poses.singular_values))
-    position = np.array([0.0, 0.0, 200.0])
-    rotation = np.asarray(Rotation.from_rotvec([0.0, 0.0, 0.4]).as_matrix())
-    start = TablePoses(table, position, rotation)
+    position: FloatArray = np.array([0.0, 0.0, 200.0])
+    rotation: FloatArray = np.asarray(Rotation.from_rotvec([0.0, 0.0, 0.4]).as_matrix())
+    pose = TablePoses(table, position, rotation)
+    lengths = pose.lengths
     last: FloatArray | None = None
     for _ in range(40):
-        *_, kernel = np.linalg.svd(start.jacobian / np.repeat([1.0, table.reach], 3))[2]
+        kernel: FloatArray = np.linalg.svd(pose.homogeneous)[2][-1]
         kernel = kernel if last is None or kernel @ last > 0.0 else -kernel
         turn = np.asarray(Rotation.from_rotvec(0.02 * kernel[3:]).as_matrix())
-        near = position + 0.02 * table.reach * kernel[:3], turn @ rotation
-        position, rotation, closes = table.forward(start.lengths, *near)
-        pose, last = TablePoses(table, position, rotation), kernel
-        assert closes
+        near: FloatArray = position + 0.02 * table.reach * kernel[:3]
+        found = table.forward(lengths, near, turn @ rotation)
+        position, rotation, last = found.position, found.rotation, kernel
+        pose = TablePoses(table, position, rotation)
+        assert found.closes
         assert np.prod(pose.singular_values) < 1e-9 * elsewhere
-        start = pose
     assert np.linalg.norm(position - [0.0, 0.0, 200.0]) > 50.0
 
 
@@ -243,9 +244,7 @@ def test_measures_of_a_table_grow_with_it() -> None:
                 name: 2.0 * np.array(getattr(OCTAHEDRAL, name))
                 for name in ("base_mm", "platform_mm", "shortest_mm", "longest_mm")
             },
-            home=changed(
-                OCTAHEDRAL.home, position_mm=(0.0, 0.0, 2.0 * OCTAHEDRAL.home.position_mm[2])
-            ),
+            home=TableHome((0.0, 0.0, 2.0 * OCTAHEDRAL.home.position_mm[2])),
         ),
     )
     values = [TableCase(table).measured for table in (small, large)]
