@@ -1,8 +1,4 @@
-"""A table on six legs to measure, as `explorer.measures.measure.Case` is a design.
-
-All positions within the strokes and cones count, on both sides of singular poses: the sign of det J
-is no assembly mode of a table, so that no pose is left out by it.
-"""
+"""A table on six legs to measure, as `explorer.measures.measure.Case` is a design."""
 
 from __future__ import annotations
 
@@ -31,6 +27,13 @@ if TYPE_CHECKING:
 
 TABLE_MEASURES = tuple(name for name, measure in CATALOGUE.items() if measure.for_tables)
 """The measures that a table has."""
+
+OF_TABLES = (
+    "All positions of a table on six legs within its strokes and cones count, on both sides of "
+    "singular poses and of the base: the sign of det J is no assembly mode of a table, while the "
+    "signs of the margins are one of a design, which keeps it."
+)
+"""What the numbers of tables mean beside those of designs, in words."""
 
 # Azimuths of the greatest tilt, steps of tilt in which a limit is looked for, and halvings of one.
 AZIMUTHS, TILT_STEPS, HALVINGS = 72, 720, 40

@@ -33,6 +33,9 @@ FIELD = "base_mm"
 """A field that no other kind of file has."""
 
 INCH = 25.4
+EQUAL = "; made equal to "
+"""What a table's source says before the design to which it was made equal."""
+
 # Height of the assumed home over the distance of the farthest base point from the origin, and the
 # lengths of the legs over those at home.
 HEIGHT, STROKE = 0.75, (0.5, 1.5)
@@ -141,17 +144,20 @@ def made_equal(table: SixLegged, design: Design) -> SixLegged:
 
     Each leg has the longest stroke of the design's l1, d2, d4 and l4, half of it to either side of
     its length at home, or from zero on if that is shorter. Each cone is the least of the design's
-    swings; there are none if the design has none.
+    swings; there are none if the design has none. The source of the table tells what was made.
     """
     ranges = [design.length_range(name) for name in LENGTHS]
     stroke = design.unit_mm * max(high - low for low, high in ranges)
     shortest = np.maximum(0.0, table.home_lengths - 0.5 * stroke)
     swings = [angle for angle in msgspec.structs.astuple(design.limits.swing) if angle is not None]
+    cones = f"cones of {min(swings):g}°" if swings else "no cones"
+    words = f"{design.name}: strokes of {stroke:.4g} mm about home's lengths, {cones}"
     return msgspec.structs.replace(
         table,
         shortest_mm=shortest,
         longest_mm=shortest + stroke,
         cones_deg=(min(swings),) * 6 if swings else None,
+        source=f"{table.source.partition(EQUAL)[0]}{EQUAL}{words}",
     )
 
 

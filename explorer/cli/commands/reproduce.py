@@ -16,18 +16,13 @@ from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design
 from explorer.measures.measure import Case
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.number_text import Unit
-from explorer.six_legged.case import TABLE_MEASURES, TableCase
+from explorer.six_legged.case import OF_TABLES, TABLE_MEASURES, TableCase
 
 if TYPE_CHECKING:
     from explorer.reproduce.claim import Result
 
 WIDTH = 96
 MILLIMETRES = Unit("mm")
-REMARK = (
-    "All positions of a table within its strokes and cones count, on both sides of singular poses "
-    "and of the base: the sign of det J is no assembly mode of a table, while the signs of the "
-    "margins are one of a design, which keeps it."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +101,7 @@ def _beside_lines(cases: Sequence[TableCase]) -> Iterator[str]:
     for case in cases:
         text = f"{case.table.name}: {case.table.source}" if case.table.source else case.table.name
         yield fill(text, WIDTH, break_on_hyphens=False)
-    yield fill(REMARK, WIDTH)
+    yield fill(OF_TABLES, WIDTH)
 
 
 def _claim_json(result: Result) -> dict[str, object]:
