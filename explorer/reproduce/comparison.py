@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import NamedTuple
@@ -110,9 +110,10 @@ def two_circles(base: float, ratio: float, spread: float) -> SixLegged:
 
 def measure_workspaces() -> Measurement:
     """Compare the volume of the 4-4's workspace with those of tables on six legs."""
+    regions = ("4-4", Workspace(FREE).region), *((each.name, each.region) for each in _mechanisms())
     ours, *others = (
-        RelativeVolume(each.name, region_volume(each.region)[0] / OPTIMAL.reach**3)
-        for each in (_four("4-4", four_four), *_twins(), *_family())
+        RelativeVolume(name, region_volume(region)[0] / OPTIMAL.reach**3)
+        for name, region in regions
     )
     twins, family = others[: len(TWINS)], others[len(TWINS) :]
     volumes = [each.volume for each in family]
@@ -142,8 +143,10 @@ def measure_orientations() -> Measurement:
 
     Those with carriages in any order are reported only.
     """
-    mechanisms = _four("4-4", four_four), _four("4-4, any order", in_any_order)
-    ours, crossed, *others = map(_abilities, (*mechanisms, *_twins(), *_family()))
+    own = Workspace(FREE).rotation, Workspace(FREE).region
+    both = (("4-4", four_four), ("4-4, any order", in_any_order))
+    mechanisms = (_Mechanism(name, *own, holds) for name, holds in both)
+    ours, crossed, *others = map(_abilities, (*mechanisms, *_mechanisms()))
     twins, family = others[: len(TWINS)], others[len(TWINS) :]
     lines = [f"{'':18}{'mean share':>12}{'error':>8}{'mean tilt':>11}{'error':>8}"]
     lines += [
@@ -173,50 +176,28 @@ def measure_orientations() -> Measurement:
     return judge(all(less) and all(lower), words, values, lines, condition)
 
 
-def _four(name: str, holds: Holds) -> _Mechanism:
-    workspace = Workspace(FREE)
-    return _Mechanism(name, workspace.rotation, workspace.region, holds)
-
-
-def _twins() -> list[_Mechanism]:
-    """Return the twins, whose modes are the signs of the margins; the carriages have no order."""
+def _mechanisms() -> Iterator[_Mechanism]:
+    """Yield the twins in the mode of the 4-4, and the family, each above the plane of its base."""
     signs = [limit for limit in Workspace(FREE).limits if "δ" in limit.name]
-    rotation = OPTIMAL.home_pose.rotation
-
-    def of(twin: SixLegged) -> _Mechanism:
-        case = TableCase(twin)
-        return _Mechanism(
-            twin.name,
-            rotation,
-            region_of((*case.limits, *signs)),
-            partial(_holds_in_mode, case),
-        )
-
-    return [of(twin) for twin in TWINS]
-
-
-def _holds_in_mode(case: TableCase, position: FloatArray, rotation: FloatArray) -> BoolArray:
-    return case.holds(position, rotation) & (mode_of(margins(position, rotation)) == MODE)
-
-
-def _holds_above(case: TableCase, position: FloatArray, rotation: FloatArray) -> BoolArray:
-    return case.holds(position, rotation) & (position[..., 2] > 0.0)
-
-
-def _family() -> list[_Mechanism]:
-    """Return the tables of the family, each on home's side of the plane of its base."""
     above = HalfSpace("above the base", np.array([0.0, 0.0, -1.0]), 0.0)
+    family = itertools.starmap(two_circles, itertools.product(BASES, RATIOS, SPREADS))
+    for tables, limits, keeps in ((TWINS, signs, _keeps_mode), (family, [above], _is_above)):
+        for table in tables:
+            case, rotation = TableCase(table), table.home_pose.rotation
+            region = region_of((*case.limits, *limits))
+            yield _Mechanism(table.name, rotation, region, partial(_holds, case, keeps))
 
-    def of(table: SixLegged) -> _Mechanism:
-        case = TableCase(table)
-        return _Mechanism(
-            table.name,
-            np.eye(3),
-            region_of((*case.limits, above)),
-            partial(_holds_above, case),
-        )
 
-    return [of(two_circles(*each)) for each in itertools.product(BASES, RATIOS, SPREADS)]
+def _holds(case: TableCase, keeps: Holds, position: FloatArray, rotation: FloatArray) -> BoolArray:
+    return case.holds(position, rotation) & keeps(position, rotation)
+
+
+def _keeps_mode(position: FloatArray, rotation: FloatArray) -> BoolArray:
+    return np.asarray(mode_of(margins(position, rotation)) == MODE)
+
+
+def _is_above(position: FloatArray, _: FloatArray) -> BoolArray:
+    return np.asarray(position[..., 2] > 0.0)
 
 
 def four_four(position: FloatArray, rotation: FloatArray) -> BoolArray:
@@ -228,7 +209,7 @@ def in_any_order(position: FloatArray, rotation: FloatArray) -> BoolArray:
     """Return whether poses keep the strokes and the mode of home."""
     joints = inverse(OPTIMAL, position, rotation)
     within = (joints >= 0.0) & (joints <= OPTIMAL.reach)
-    return within.all(axis=-1) & (mode_of(margins(position, rotation)) == MODE)
+    return within.all(axis=-1) & _keeps_mode(position, rotation)
 
 
 def _abilities(mechanism: _Mechanism) -> Abilities:

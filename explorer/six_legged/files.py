@@ -113,11 +113,6 @@ def load_table(name_or_file: str | Path) -> SixLegged:
     return decode_table(read_at_most(path), str(path))
 
 
-def encode_table(table: SixLegged) -> bytes:
-    """Return the table as indented JSON, which `decode_table` reads back unchanged."""
-    return msgspec.json.format(msgspec.json.encode(table), indent=2) + b"\n"
-
-
 def six_four_twin(design: Design, a2x: float, longest: float | None = None) -> SixLegged:
     """Return the 6-4 twin of a design: each leg along the guide becomes two, from a1 and from a2.
 
@@ -161,11 +156,11 @@ def made_equal(table: SixLegged, design: Design) -> SixLegged:
     )
 
 
-def _load_tables() -> Mapping[str, SixLegged]:
-    files = packaged_files("tables", ".json")
-    tables = [decode_strictly(file.read_bytes(), SixLegged, file.name) for file in files]
-    return MappingProxyType({table.name: table for table in tables})
-
-
-TABLES: Mapping[str, SixLegged] = _load_tables()
+_FILES = packaged_files("tables", ".json")
+TABLES: Mapping[str, SixLegged] = MappingProxyType(
+    {
+        table.name: table
+        for table in (decode_strictly(file.read_bytes(), SixLegged, file.name) for file in _FILES)
+    }
+)
 """The packaged tables, by name."""

@@ -60,7 +60,7 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import Unit
 from explorer.page.widgets.assigning import Assigner
 from explorer.six_legged.case import TableCase
-from explorer.six_legged.files import TABLES, encode_table, made_equal
+from explorer.six_legged.files import TABLES, made_equal
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.slices.volume import node_count_of, workspace_volume
 from explorer.workspace.workspace import Workspace
@@ -485,7 +485,7 @@ def test_table_that_is_dropped_is_pinned(
     )
     saved = page.get(SavedDesigns)
     for data, name in (
-        (encode_table(TABLES["Dietmaier"]), "dietmaier.json"),
+        (msgspec.json.encode(TABLES["Dietmaier"]), "dietmaier.json"),
         (b"setp genhexkins.base.0.x -30\n", "machine.hal"),
         (b"loadrt trivkins\n", "other.HAL"),
     ):

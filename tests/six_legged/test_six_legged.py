@@ -23,7 +23,6 @@ from explorer.six_legged.case import TABLE_MEASURES, TableCase
 from explorer.six_legged.files import (
     TABLES,
     decode_table,
-    encode_table,
     load_table,
     made_equal,
     six_four_twin,
@@ -291,7 +290,7 @@ def test_tables_measure_the_same_things_as_designs() -> None:
 @pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
 def test_file_gives_the_table_back(table: SixLegged, tmp_path: Path) -> None:
     path = tmp_path / "table.json"
-    path.write_bytes(encode_table(table))
+    path.write_bytes(msgspec.json.encode(table))
     assert load_table(path) == load_table(table.name) == table
 
 
