@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from explorer.measures.loads import loads
 from explorer.measures.measure import NEEDS, Case, Measure, Place
 from explorer.measures.workspace import coordinates, workspace_measures
+from explorer.mechanism.design import Design
 from explorer.numerics.computed_once import computed_once
 
 CATALOGUE: Mapping[str, Measure] = {
@@ -27,24 +28,18 @@ def measures_in(place: Place) -> dict[str, Measure]:
     return {name: measure for name, measure in CATALOGUE.items() if place in measure.places}
 
 
-@dataclass(frozen=True)
-class Measurements:
-    """The values of measures for one design, in design units, or of a table, in millimetres.
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """The values of measures for one design, in design units, or for a table, in millimetres.
 
     Attributes:
         values: By name out of `CATALOGUE`; None where there is none, as of an empty workspace.
         empty_because: The limits that empty the workspace; () if it is not empty.
-        nearest: The two legs that have the least clearance; None if it was not measured.
-        demanded_margin: Least |δ| at which the demanded clearance counts; None without demand.
-        demanded_nearest: The two legs that have the least demanded clearance, or None.
         infinite: Measures whose value is infinite, as that of forces in a singular pose.
     """
 
     values: Mapping[str, float | None]
     empty_because: tuple[str, ...]
-    nearest: tuple[int, int] | None = None
-    demanded_margin: float | None = None
-    demanded_nearest: tuple[int, int] | None = None
     infinite: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float | None:
@@ -54,6 +49,23 @@ class Measurements:
     def value(self, name: str) -> float | None:
         """Return the value of a measure, which may be infinite; None if there is none."""
         return math.inf if name in self.infinite else self.values.get(name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurements(Measured):
+    """The values of measures for one design.
+
+    Attributes:
+        design: The manipulator.
+        nearest: The two legs that have the least clearance; None if it was not measured.
+        demanded_margin: Least |δ| at which the demanded clearance counts; None without demand.
+        demanded_nearest: The two legs that have the least demanded clearance, or None.
+    """
+
+    design: Design
+    nearest: tuple[int, int] | None = None
+    demanded_margin: float | None = None
+    demanded_nearest: tuple[int, int] | None = None
 
 
 def measure_design(case: Case, names: Iterable[str]) -> Measurements:
@@ -71,6 +83,7 @@ def measure_design(case: Case, names: Iterable[str]) -> Measurements:
 def _measure(case: Case, names: tuple[str, ...]) -> Measurements:
     values, infinite = values_of(case, names)
     return Measurements(
+        design=case.design,
         values=values,
         empty_because=case.volume.empty_because,
         nearest=case.clearance[1] if "least_clearance" in values else None,

@@ -181,7 +181,6 @@ class Optimum:
     """
 
     name: str
-    design: Design
     measured: Measurements
     iterations: int | None = None
     objective: float | None = None
@@ -197,12 +196,11 @@ def measure_search() -> Measurement:
         case = Case(design, demanded_margin=margin, node_step=STEP)
         return measure_design(case, (*measures_in("optimise"), "reach", "node_step"))
 
-    first, last = defaults.paper_start(), PRESETS["paper-optimal"]
-    optimal = measure(last)
+    optimal = measure(PRESETS["paper-optimal"])
     node_objective = abs(1.0 - (optimal["node_volume"] or 0.0) / defaults.PAPER_VOLUME)
     optima = [
-        Optimum("the paper's initial design", first, measure(first)),
-        Optimum("the paper's optimum, by nodes", last, optimal, PAPER_ITERATIONS, node_objective),
+        Optimum("the paper's initial design", measure(defaults.paper_start())),
+        Optimum("the paper's optimum, by nodes", optimal, PAPER_ITERATIONS, node_objective),
     ]
     for name, problem, starts in (
         ("volume 8000, interference off", defaults.paper_problem(None), 1),
@@ -213,7 +211,7 @@ def measure_search() -> Measurement:
         found = optimise_design(problem, starts=starts)
         objective = found.best.objective if problem.objective == "match-volume" else None
         result = measure(found.design), found.iterations, objective, found.converged
-        optima.append(Optimum(name, found.design, *result, starts))
+        optima.append(Optimum(name, *result, starts))
     paper, matches = optima[1], [each for each in optima[2:] if each.objective is not None]
     exact = abs(1.0 - (paper.measured["volume"] or 0.0) / defaults.PAPER_VOLUME)
     smallest = min(each.measured["reach"] or 0.0 for each in optima if each.starts > 1)
@@ -240,9 +238,9 @@ def _values(optimum: Optimum) -> Values:
         "name": optimum.name,
         "iterations": optimum.iterations,
         "objective": optimum.objective,
-        "variables": optimum.design.variables,
+        "variables": measured.design.variables,
         **{name: measured[name] for name in names},
-        "box_margin": _box_margin(optimum.design),
+        "box_margin": _box_margin(measured.design),
         "clearance": measured["least_clearance"],
         "demanded_clearance": measured["demanded_clearance"],
     }
@@ -253,7 +251,7 @@ def _table(optima: Sequence[Optimum]) -> list[str]:
     lines = [f"{'':34}" + "".join(f"{head:>13}" for head in heads)]
     for optimum in optima:
         measured, objective = optimum.measured, optimum.objective
-        reach, margin = measured["reach"], _box_margin(optimum.design)
+        reach, margin = measured["reach"], _box_margin(measured.design)
         small = objective is not None and objective < MATCHED
         cells = (
             _cell(optimum.iterations, "d"),

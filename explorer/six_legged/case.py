@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.measures.catalogue import CATALOGUE, Measurements, values_of
+from explorer.measures.catalogue import CATALOGUE, Measured, values_of
 from explorer.mechanism.pose import rotation_array
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -147,8 +147,8 @@ class TableCase:
         return np.asarray(held.all(axis=-1))
 
     @cached_property
-    def measured(self) -> Measurements:
+    def measured(self) -> Measured:
         """The values of `TABLE_MEASURES`, in millimetres, degrees and plain numbers."""
         # The measures of tables ask only for what both cases have.
         values, infinite = values_of(cast("Case", cast("Any", self)), TABLE_MEASURES)
-        return Measurements(values, self.volume.empty_because, infinite=infinite)
+        return Measured(values=values, empty_because=self.volume.empty_because, infinite=infinite)

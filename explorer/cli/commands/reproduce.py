@@ -12,7 +12,7 @@ from explorer.cli import values
 from explorer.cli.options import JsonOptions
 from explorer.cli.output import attributes, figure, table
 from explorer.cli.streams import write_error
-from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design
+from explorer.measures.catalogue import CATALOGUE, Measured, measure_design
 from explorer.measures.measure import Case
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.number_text import Unit
@@ -70,7 +70,7 @@ class ReproduceCommand(JsonOptions):
         )
 
 
-def _values_json(measured: Measurements) -> dict[str, object]:
+def _values_json(measured: Measured) -> dict[str, object]:
     """Return values in millimetres and degrees, by names that end in their units."""
     units = {3: "_mm3", 1: "_mm"}
     return {

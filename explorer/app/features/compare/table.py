@@ -20,7 +20,7 @@ from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
 from explorer.measures.blocks.block import Look
-from explorer.measures.catalogue import Measure, Measurements, measures_in
+from explorer.measures.catalogue import Measure, Measured, measures_in
 from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics import number_text
@@ -55,7 +55,7 @@ class ComparedDesign:
 
     number: int
     design: Comparable
-    measured: Measurements | None
+    measured: Measured | None
     unit: Unit
     is_current: bool = True
     problem: str | None = None
