@@ -59,6 +59,9 @@ from .prototype.assembly import make_prototype as make_prototype
 from .singularity.ellipsoids import performance as performance
 from .singularity.nearest import nearest_singularities as nearest_singularities
 from .singularity.strata import stratum as stratum
+from .six_legged.case import TableCase as TableCase
+from .six_legged.files import TABLES as TABLES, load_table as load_table
+from .six_legged.table import SixLegged as SixLegged, TablePoses as TablePoses
 from .statics.accuracy import (
     pose_error_by_geometry as pose_error_by_geometry,
     worst_error as worst_error,

@@ -27,6 +27,7 @@ RINGS = {
         "statics",
         "workspace",
         "measures",
+        "six_legged",
         "paths",
         "optimise",
         "find",

@@ -28,26 +28,18 @@ def measures_in(place: Place) -> dict[str, Measure]:
     return {name: measure for name, measure in CATALOGUE.items() if place in measure.places}
 
 
-@dataclass(frozen=True)
-class Measurements:
-    """The values of measures for one design, in design units.
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """The values of measures for one design, in design units, or for a table, in millimetres.
 
     Attributes:
-        design: The manipulator.
         values: By name out of `CATALOGUE`; None where there is none, as of an empty workspace.
         empty_because: The limits that empty the workspace; () if it is not empty.
-        nearest: The two legs that have the least clearance; None if it was not measured.
-        demanded_margin: Least |δ| at which the demanded clearance counts; None without demand.
-        demanded_nearest: The two legs that have the least demanded clearance, or None.
         infinite: Measures whose value is infinite, as that of forces in a singular pose.
     """
 
-    design: Design
     values: Mapping[str, float | None]
     empty_because: tuple[str, ...]
-    nearest: tuple[int, int] | None = None
-    demanded_margin: float | None = None
-    demanded_nearest: tuple[int, int] | None = None
     infinite: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float | None:
@@ -57,6 +49,23 @@ class Measurements:
     def value(self, name: str) -> float | None:
         """Return the value of a measure, which may be infinite; None if there is none."""
         return math.inf if name in self.infinite else self.values.get(name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurements(Measured):
+    """The values of measures for one design.
+
+    Attributes:
+        design: The manipulator.
+        nearest: The two legs that have the least clearance; None if it was not measured.
+        demanded_margin: Least |δ| at which the demanded clearance counts; None without demand.
+        demanded_nearest: The two legs that have the least demanded clearance, or None.
+    """
+
+    design: Design
+    nearest: tuple[int, int] | None = None
+    demanded_margin: float | None = None
+    demanded_nearest: tuple[int, int] | None = None
 
 
 def measure_design(case: Case, names: Iterable[str]) -> Measurements:
@@ -72,16 +81,7 @@ def measure_design(case: Case, names: Iterable[str]) -> Measurements:
 
 @computed_once
 def _measure(case: Case, names: tuple[str, ...]) -> Measurements:
-    values: dict[str, float | None] = {}
-    infinite: list[str] = []
-    for name in names:
-        measure = CATALOGUE[name]
-        if not all(map(case.has, measure.needs)):
-            continue
-        value = measure.function(case)
-        values[name] = None if not math.isfinite(value) else value
-        if math.isinf(value):
-            infinite.append(name)
+    values, infinite = values_of(case, names)
     return Measurements(
         design=case.design,
         values=values,
@@ -89,8 +89,20 @@ def _measure(case: Case, names: tuple[str, ...]) -> Measurements:
         nearest=case.clearance[1] if "least_clearance" in values else None,
         demanded_margin=case.demanded_margin,
         demanded_nearest=case.demanded_clearance[1] if "demanded_clearance" in values else None,
-        infinite=tuple(infinite),
+        infinite=infinite,
     )
+
+
+def values_of(case: Case, names: Iterable[str]) -> tuple[dict[str, float | None], tuple[str, ...]]:
+    """Return the values of measures by name, None where there is none, and the infinite ones."""
+    measures = [CATALOGUE[name] for name in names]
+    values = {
+        each.name: each.function(case)
+        for each in measures
+        if all(case.has(need) for need in each.needs)
+    }
+    infinite = tuple(name for name, value in values.items() if math.isinf(value))
+    return {k: v if math.isfinite(v) else None for k, v in values.items()}, infinite
 
 
 def reason_for_missing(case: Case, measurements: Measurements) -> str:

@@ -17,6 +17,7 @@ from explorer.legs.clearance import PAIRS
 from explorer.measures.snapshot import PoseIndices
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.pose import Pose
+from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.computed_once import computed_once
 from explorer.numerics.number_text import Unit
@@ -30,6 +31,8 @@ from explorer.workspace.least_clearance import (
     least_clearances,
     node_measures,
 )
+from explorer.workspace.orientations.share import orientation_share
+from explorer.workspace.orientations.tilts import greatest_tilts
 from explorer.workspace.slices.volume import NodeCount, Volume, node_count_of, volume_of
 from explorer.workspace.workspace import Workspace
 
@@ -110,6 +113,29 @@ class Case:
         margin = self.clearance_margin
         return node_measures(self.workspace, nodes=self.nodes, clearance_margin=margin)
 
+    @property
+    def node_positions(self) -> FloatArray:
+        """The nodes of `at_nodes`, shape (n, 3)."""
+        return self.at_nodes.positions
+
+    @property
+    def longest_leg(self) -> float:
+        """The longest leg, see `longest_leg`."""
+        return longest_leg(self.design)
+
+    @property
+    def home_share(self) -> float:
+        """The share of all orientations that the home position can have."""
+        return orientation_share(self.design, self.design.home_pose.position).share
+
+    @property
+    def home_tilt(self) -> float:
+        """The greatest tilt in every azimuth at home, in degrees; 0 if tilt zero is not allowed."""
+        home = self.design.home_pose
+        torsion = tilt_torsion_of(home.rotation).torsion
+        tilts = greatest_tilts(self.design, np.array(home.position), torsion)
+        return float(np.nan_to_num(tilts).min())
+
     @cached_property
     def home_indices(self) -> PoseIndices:
         """The indices of conditioning, manipulability and transmission in the home pose."""
@@ -119,7 +145,7 @@ class Case:
     @cached_property
     def node_indices(self) -> PoseIndices:
         """The indices of conditioning, manipulability and transmission at the nodes."""
-        return PoseIndices(self.design, self.at_nodes.positions, self.rotation)
+        return PoseIndices(self.design, self.node_positions, self.rotation)
 
     @property
     def clearance(self) -> tuple[float, tuple[int, int] | None]:
@@ -239,6 +265,7 @@ class Measure:
         needs: What the measure needs of a case, out of `NEEDS`.
         reason: Why a workspace that is not empty lacks the value; "" if nothing is known.
         places: Where it is listed.
+        for_tables: Whether a table on six legs has it too, see `explorer.six_legged.case`.
     """
 
     name: str
@@ -255,6 +282,7 @@ class Measure:
     needs: tuple[str, ...] = ()
     reason: Callable[[Case], str] = lambda _: ""
     places: tuple[Place, ...] = get_args(Place)
+    for_tables: bool = False
 
     @property
     def heading(self) -> str:

@@ -29,14 +29,28 @@ from explorer.singularity.nearest import (
     singularities_of,
 )
 from explorer.singularity.strata import GENERIC, incidences, inversions, stratum_of
+from explorer.statics.accuracy import CORNERS
 from explorer.workspace.limits.valid_poses import Collision, Violation, violations
 
 
-class PoseIndices(Configuration):
-    """A design in poses with its indices of conditioning; each is 0 in a singular pose.
+class Indices:
+    """Indices of poses, which follow from J; those of conditioning are 0 in a singular pose.
 
-    The first of them is `Configuration.inverse_condition`.
+    Attributes:
+        singular_values: Those of J with lengths over the reach, descending, shape (..., 6).
+        twists: J⁻¹, whose columns are twists (v; ω), shape (..., 6, 6); infinite in singular poses.
+        joint_arms: Vectors from the point of the twists to the points at which the forces of the
+            joints act on the platform, shape (..., 6, 3).
     """
+
+    singular_values: cached_property[FloatArray]
+    twists: cached_property[FloatArray]
+    joint_arms: cached_property[FloatArray]
+
+    @property
+    def inverse_condition(self) -> FloatArray:
+        """The inverse condition number 1/κ of J with lengths over the reach, shape (...)."""
+        return self.singular_values[..., -1] / self.singular_values[..., 0]
 
     @property
     def smallest_singular_value(self) -> FloatArray:
@@ -76,7 +90,7 @@ class PoseIndices(Configuration):
         The force of each actuator lies along its motion, so that the input transmission indices
         are 1.
         """
-        twists = np.swapaxes(twists_of_actuators(self), -1, -2)
+        twists = np.swapaxes(self.twists, -1, -2)
         # Velocities of the points are infinite in a singular pose.
         with np.errstate(invalid="ignore"):
             speeds = lengths_of(twists[..., :3] + np.cross(twists[..., 3:], self.joint_arms))
@@ -86,6 +100,31 @@ class PoseIndices(Configuration):
     def transmission_index(self) -> FloatArray:
         """The local transmission index, the least of `transmissions`, shape (...)."""
         return self.transmissions.min(axis=-1)
+
+    @property
+    def force_per_newton(self) -> FloatArray:
+        """The largest force of an actuator by a force of 1 N in any direction, shape (...).
+
+        The force acts at the point of the twists, without a moment. Row i of J⁻ᵀ, which gives the
+        force of actuator i, is column i of J⁻¹; only its first three entries count.
+        """
+        return lengths_of(np.swapaxes(self.twists[..., :3, :], -1, -2)).max(axis=-1)
+
+    @property
+    def error_per_joint_error(self) -> FloatArray:
+        """The largest displacement of the point by errors within ±1 of every joint, shape (...)."""
+        with np.errstate(invalid="ignore"):
+            moved = lengths_of(np.swapaxes(self.twists[..., :3, :] @ CORNERS, -1, -2))
+        return np.where(np.isnan(moved), np.inf, moved).max(axis=-1)
+
+
+class PoseIndices(Configuration, Indices):
+    """A design in poses with its indices, those of forces and velocities at b4."""
+
+    @cached_property
+    def twists(self) -> FloatArray:
+        """J⁻¹ at the tool, shape (..., 6, 6); infinite in a singular pose."""
+        return twists_of_actuators(self)
 
 
 class Snapshot(PoseIndices):

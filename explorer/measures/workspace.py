@@ -14,13 +14,10 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
-from explorer.measures.measure import Case, Measure, Sense, longest_leg
+from explorer.measures.measure import Case, Measure, Sense
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.margins import MARGIN_KINDS, margins
-from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.orientations.share import orientation_share
-from explorer.workspace.orientations.tilts import greatest_tilts
 
 Length = partial(Measure, power=1)
 # Measures of which more is better.
@@ -33,7 +30,7 @@ def _off_planes(case: Case) -> str:
 
 
 def _no_node(case: Case) -> str:
-    if len(case.at_nodes.positions):
+    if len(case.node_positions):
         return ""
     return f"none of {case.nodes} nodes an axis lies in the workspace"
 
@@ -88,13 +85,6 @@ def _home_margin(case: Case) -> float:
     return float(np.abs(margins(home.position, home.rotation)).min())
 
 
-def _home_tilt(case: Case) -> float:
-    home = case.design.home_pose
-    torsion = tilt_torsion_of(home.rotation).torsion
-    tilts = greatest_tilts(case.design, np.array(home.position), torsion)
-    return float(np.nan_to_num(tilts).min())
-
-
 def _sizes() -> Iterable[Measure]:
     yield More(
         "volume",
@@ -104,13 +94,15 @@ def _sizes() -> Iterable[Measure]:
         lambda case: case.volume.volume,
         title="exact volume",
         power=3,
+        for_tables=True,
     )
     yield More(
         "volume_per_leg",
         "volume / longest leg³",
         "Volume of the workspace for the size of the design",
-        lambda case: case.volume.volume / longest_leg(case.design) ** 3,
+        lambda case: case.volume.volume / case.longest_leg**3,
         places=("compare",),
+        for_tables=True,
     )
     yield Measure(
         "node_count",
@@ -150,9 +142,10 @@ def _sizes() -> Iterable[Measure]:
         "longest_leg",
         "longest leg",
         "The largest maximum length of l1, d2, d4 and l4; the reach where all are tied to it",
-        lambda case: longest_leg(case.design),
+        lambda case: case.longest_leg,
         sense="less",
         places=("compare", "optimise", "studies"),
+        for_tables=True,
     )
     for axis, name in enumerate("xyz"):
         yield Length(
@@ -162,6 +155,7 @@ def _sizes() -> Iterable[Measure]:
             lambda case, axis=axis: float(case.extent[axis]),
             cost="high",
             places=("compare",),
+            for_tables=True,
         )
     for axis, name in enumerate("xyz"):
         yield _length_at_nodes(
@@ -286,6 +280,7 @@ def _index(name: str, label: str, hint: str, mean: str = "") -> Iterable[Measure
         f"In the home pose, the {hint}",
         lambda case: float(getattr(case.home_indices, name)),
         places=("compare", "studies"),
+        for_tables=True,
     )
     yield AtNodes(
         f"worst_{name}",
@@ -293,7 +288,8 @@ def _index(name: str, label: str, hint: str, mean: str = "") -> Iterable[Measure
         f"Least value at the nodes of the workspace of the {hint}",
         over_nodes(np.min),
         cost="high",
-        places=("studies",),
+        places=("studies",) if mean else ("compare", "studies"),
+        for_tables=True,
     )
     if mean:
         yield AtNodes(
@@ -302,6 +298,7 @@ def _index(name: str, label: str, hint: str, mean: str = "") -> Iterable[Measure
             f"Mean over the nodes of the workspace of the {hint}",
             over_nodes(np.mean),
             cost="high",
+            for_tables=True,
         )
 
 
@@ -332,6 +329,28 @@ def _indices() -> Iterable[Measure]:
         "manipulability",
         "manipulability |det J|, with lengths divided by the reach; 0 is singular (Yoshikawa 1985)",
     )
+    for name, label, hint in (
+        (
+            "force_per_newton",
+            "largest force per newton",
+            "the largest force of an actuator for each newton of a force in any direction",
+        ),
+        (
+            "error_per_joint_error",
+            "error per joint error",
+            "the largest displacement for each unit of error of all six joints",
+        ),
+    ):
+        yield Measure(
+            name,
+            f"{label} at home",
+            f"In the home pose, at b4 (of a table on six legs, at the platform's origin), {hint}; "
+            "infinite in a singular pose",
+            lambda case, name=name: float(getattr(case.home_indices, name)),
+            sense="less",
+            places=("compare", "studies"),
+            for_tables=True,
+        )
 
 
 def _orientations() -> Iterable[Measure]:
@@ -339,18 +358,20 @@ def _orientations() -> Iterable[Measure]:
         "orientation_share",
         "orientation share at home",
         "Share of all orientations that the home position can have within the limits",
-        lambda case: orientation_share(case.design, case.design.home_pose.position).share,
+        lambda case: case.home_share,
         unit="share",
         places=("compare", "optimise", "studies", "report"),
+        for_tables=True,
     )
     yield More(
         "home_tilt",
         "tilt at home",
         "Greatest tilt in every azimuth at the home position, from tilt zero at home's torsion; 0 "
         "if tilt zero violates a limit",
-        _home_tilt,
+        lambda case: case.home_tilt,
         unit="°",
         places=("compare", "optimise", "studies", "report"),
+        for_tables=True,
     )
 
 

@@ -1,52 +1,78 @@
-"""Claims that compare workspace and orientations of the 4-4 with those of other mechanisms."""
+"""Claims that compare workspace and orientations of the 4-4 with those of tables on six legs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
-from scipy.stats import qmc
 
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.reproduce.claim import Measurement, judge
-from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
+from explorer.six_legged.case import TableCase
+from explorer.six_legged.files import six_four_twin
+from explorer.six_legged.table import SixLegged, TableHome, table_of
+from explorer.workspace.least_clearance import nodes_of
+from explorer.workspace.limits.constraints import HalfSpace
+from explorer.workspace.limits.region import Region, region_of
 from explorer.workspace.limits.valid_poses import poses_are_valid
-from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.slices.volume import region_volume
+from explorer.workspace.workspace import Workspace
 
-OPTIMAL = PRESETS["paper-optimal"]
+# In units of 1 mm, as the tables beside it.
+OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=1.0)
 # The optimum with no limit but its mode, the order of its carriages, and a stroke of one reach for
 # each actuator, as the legs of the others have: the guide goes from a1 to a2.
 STROKES = OPTIMAL.with_limits(box=None, guide=(0.0, OPTIMAL.reach))
 FREE = msgspec.structs.replace(STROKES, home=OPTIMAL.home_pose)
 TWINS = [six_four_twin(OPTIMAL, a2x) for a2x in (10.0, OPTIMAL.reach)]
 """The twin at two positions of a2, in design units."""
-SIZES = (0.75, 1.0, 1.5)
-"""Factors of the base of the octahedral platform."""
 
-# Sets of points whose spread gives the error of a volume, and the binary logarithm of their size.
-SETS, POINTS_LOG2 = 8, 16
-POSITIONS, ORIENTATIONS, AZIMUTHS, MOST_TILT = 300, 1000, 24, 90
+BASES, RATIOS, SPREADS = (0.25, 0.4, 0.55), (0.3, 0.6, 0.9), (0.0, 15.0)
+"""The tables of the family: radii of the base's circle over the reach, radii of the platform's
+over the base's, and half the angle of each pair of neighbouring joints, in degrees; 0 is the
+octahedral table."""
+
+LEGEND = (
+    "",
+    "Tables: radius of the base over the reach, of the platform over that of the base, and",
+    "half the angle of a pair of joints.",
+)
+POSITIONS, ORIENTATIONS, AZIMUTHS, MOST_TILT = 100, 1000, 24, 90
 # Standard errors up to which a difference counts as none.
 SIGMAS = 3.0
+MODE = mode_of(margins(OPTIMAL.home_pose.position, OPTIMAL.home_pose.rotation))
+"""The assembly mode of home."""
+
 # Relative difference up to which two volumes count as alike.
 ALIKE = 0.01
 
 Holds = Callable[[FloatArray, FloatArray], BoolArray]
 
 
+class _Mechanism(NamedTuple):
+    """A mechanism: its workspace at home's orientation, and which poses it can have."""
+
+    name: str
+    rotation: FloatArray
+    region: Region
+    holds: Holds
+
+
 @dataclass(frozen=True)
 class RelativeVolume:
-    """The volume over the cubed reach at the orientation of home, and its standard error."""
+    """The exact volume over the cubed reach at the orientation of home."""
 
     name: str
     volume: float
-    error: float
 
 
 @dataclass(frozen=True)
@@ -64,64 +90,114 @@ class Abilities:
     tilt_error: float
 
 
+def two_circles(base: float, ratio: float, spread: float) -> SixLegged:
+    """Return a table of the family, whose legs are as long as the reach at most."""
+    corners = np.radians(np.repeat([0.0, 120.0, 240.0], 2) + np.tile([-spread, spread], 3))
+    tips = np.radians(np.repeat([60.0, 180.0, 300.0], 2) + np.tile([-spread, spread], 3))
+    # The second of a pair and the first of the next one lead to one pair of the platform.
+    tips = np.roll(tips, 1)
+    circles = [np.stack([np.cos(t), np.sin(t), 0.0 * t], axis=1) for t in (corners, tips)]
+    reach = OPTIMAL.reach
+    return table_of(
+        name=f"table {base:g} {ratio:g} {spread:g}°",
+        base_mm=base * reach * circles[0],
+        platform_mm=base * ratio * reach * circles[1],
+        shortest_mm=(0.0,) * 6,
+        longest_mm=(reach,) * 6,
+        home=TableHome((0.0, 0.0, 0.5 * reach)),
+    )
+
+
 def measure_workspaces() -> Measurement:
-    """Compare the volume of the 4-4's workspace with those of six-legged mechanisms."""
-    exact = workspace_volume(FREE).volume / OPTIMAL.reach**3
-    ours = RelativeVolume("4-4", exact, 0.0)
-    twins = [_workspace(each) for each in TWINS]
-    octahedra = [_workspace(octahedral(OPTIMAL, size)) for size in SIZES]
-    others = (*twins, *octahedra)
-    lines = [f"{'':18}{'volume/reach³':>14}{'error':>8}"]
-    lines += [f"{each.name:18}{each.volume:14.3f}{each.error:8.3f}" for each in (ours, *others)]
+    """Compare the volume of the 4-4's workspace with those of tables on six legs."""
+    regions = ("4-4", Workspace(FREE).region), *((each.name, each.region) for each in _mechanisms())
+    ours, *others = (
+        RelativeVolume(name, region_volume(region)[0] / OPTIMAL.reach**3)
+        for name, region in regions
+    )
+    twins, family = others[: len(TWINS)], others[len(TWINS) :]
+    volumes = [each.volume for each in family]
+
+    def smaller(among: Sequence[RelativeVolume]) -> int:
+        return sum(each.volume < (1.0 - ALIKE) * ours.volume for each in among)
+
     words = {
         "ours": ours,
-        "others": ", ".join(f"{each.volume:.3f} ({each.name})" for each in others),
+        "twins": ", ".join(f"{each.volume:.3f} ({each.name})" for each in twins),
+        "smaller": smaller(family),
+        "family": len(family),
+        "range": (min(volumes), max(volumes)),
     }
+    lines = [f"{'':18}{'volume/reach³':>14}"]
+    lines += [f"{each.name:18}{each.volume:14.3f}" for each in (ours, *others)]
+    lines += LEGEND
     values = {"mechanisms": [asdict(each) for each in (ours, *others)]}
-
-    def is_largest(among: Sequence[RelativeVolume]) -> bool:
-        return all(each.volume < (1.0 - ALIKE) * ours.volume for each in among)
-
-    condition = "beside the 6-4; an octahedral platform has more or less by the size of its base"
-    is_within = is_largest(twins) and any(is_largest([each]) for each in octahedra)
-    return judge(is_largest(others), words, values, lines, condition if is_within else "")
+    condition = "beside the 6-4, and beside tables on six legs by their proportions"
+    is_within = smaller(twins) == len(twins) and smaller(family) > 0
+    is_so = smaller(others) == len(others)
+    return judge(is_so, words, values, lines, condition if is_within else "")
 
 
 def measure_orientations() -> Measurement:
-    """Compare the orientations of the 4-4 with those of six-legged mechanisms.
+    """Compare the orientations of the 4-4 with those of tables on six legs.
 
     Those with carriages in any order are reported only.
     """
-    reach = OPTIMAL.reach
-    points = qmc.scale(_points(0), 3 * [-2.0 * reach], 3 * [2.0 * reach])
-    rotation = OPTIMAL.home_pose.rotation
-    ours = _abilities("4-4", four_four, points, rotation)
-    crossed = _abilities("4-4, any order", in_any_order, points, rotation)
-    others = [
-        _abilities(each.name, each.holds, qmc.scale(_points(0), *each.box), each.home[1])
-        for each in (*TWINS, octahedral(OPTIMAL))
-    ]
+    own = Workspace(FREE).rotation, Workspace(FREE).region
+    both = (("4-4", four_four), ("4-4, any order", in_any_order))
+    mechanisms = (_Mechanism(name, *own, holds) for name, holds in both)
+    ours, crossed, *others = map(_abilities, (*mechanisms, *_mechanisms()))
+    twins, family = others[: len(TWINS)], others[len(TWINS) :]
     lines = [f"{'':18}{'mean share':>12}{'error':>8}{'mean tilt':>11}{'error':>8}"]
     lines += [
         f"{a.name:18}{a.share:12.1%}{a.share_error:8.1%}{a.tilt:10.1f}°{a.tilt_error:7.1f}°"
         for a in (ours, crossed, *others)
     ]
+    lines += LEGEND
+    less = [
+        SIGMAS * np.hypot(ours.share_error, a.share_error) < ours.share - a.share for a in others
+    ]
+    lower = [SIGMAS * np.hypot(ours.tilt_error, a.tilt_error) < ours.tilt - a.tilt for a in others]
+    shares, tilts = [a.share for a in family], [a.tilt for a in family]
     words = {
         "ours": ours,
         "crossed": crossed,
-        "shares": ", ".join(f"{a.share:.1%} ({a.name})" for a in others),
-        "tilts": ", ".join(f"{a.tilt:.0f}° ({a.name})" for a in others),
+        "shares": ", ".join(f"{a.share:.1%} ({a.name})" for a in twins),
+        "tilts": ", ".join(f"{a.tilt:.0f}° ({a.name})" for a in twins),
+        "family": len(family),
+        "less": sum(less[len(twins) :]),
+        "lower": sum(lower[len(twins) :]),
+        "range": (min(shares), max(shares)),
+        "tilt_range": (min(tilts), max(tilts)),
     }
     values = {"mechanisms": [asdict(each) for each in (ours, crossed, *others)]}
-    by_share = all(
-        ours.share - a.share > SIGMAS * np.hypot(ours.share_error, a.share_error) for a in others
-    )
-    by_tilt = all(
-        ours.tilt - a.tilt > SIGMAS * np.hypot(ours.tilt_error, a.tilt_error) for a in others
-    )
-    condition = "by the greatest tilt" if by_tilt else ""
-    condition = "by the share of all orientations" if by_share else condition
-    return judge(by_share and by_tilt, words, values, lines, condition)
+    condition = "by the greatest tilt" if all(lower) else ""
+    condition = "by the share of all orientations" if all(less) else condition
+    return judge(all(less) and all(lower), words, values, lines, condition)
+
+
+def _mechanisms() -> Iterator[_Mechanism]:
+    """Yield the twins in the mode of the 4-4, and the family, each above the plane of its base."""
+    signs = [limit for limit in Workspace(FREE).limits if "δ" in limit.name]
+    above = HalfSpace("above the base", np.array([0.0, 0.0, -1.0]), 0.0)
+    family = itertools.starmap(two_circles, itertools.product(BASES, RATIOS, SPREADS))
+    for tables, limits, keeps in ((TWINS, signs, _keeps_mode), (family, [above], _is_above)):
+        for table in tables:
+            case, rotation = TableCase(table), table.home_pose.rotation
+            region = region_of((*case.limits, *limits))
+            yield _Mechanism(table.name, rotation, region, partial(_holds, case, keeps))
+
+
+def _holds(case: TableCase, keeps: Holds, position: FloatArray, rotation: FloatArray) -> BoolArray:
+    return case.holds(position, rotation) & keeps(position, rotation)
+
+
+def _keeps_mode(position: FloatArray, rotation: FloatArray) -> BoolArray:
+    return np.asarray(mode_of(margins(position, rotation)) == MODE)
+
+
+def _is_above(position: FloatArray, _: FloatArray) -> BoolArray:
+    return np.asarray(position[..., 2] > 0.0)
 
 
 def four_four(position: FloatArray, rotation: FloatArray) -> BoolArray:
@@ -131,31 +207,16 @@ def four_four(position: FloatArray, rotation: FloatArray) -> BoolArray:
 
 def in_any_order(position: FloatArray, rotation: FloatArray) -> BoolArray:
     """Return whether poses keep the strokes and the mode of home."""
-    joints, home = inverse(OPTIMAL, position, rotation), OPTIMAL.home_pose
+    joints = inverse(OPTIMAL, position, rotation)
     within = (joints >= 0.0) & (joints <= OPTIMAL.reach)
-    mode = mode_of(margins(home.position, home.rotation))
-    return within.all(axis=-1) & (mode_of(margins(position, rotation)) == mode)
+    return within.all(axis=-1) & _keeps_mode(position, rotation)
 
 
-def _points(seed: int) -> FloatArray:
-    """Return scrambled points of the sequence of Sobol in the unit cube, shape (n, 3)."""
-    return qmc.Sobol(3, rng=np.random.default_rng([10, seed])).random_base2(POINTS_LOG2)
-
-
-def _workspace(mechanism: SixLegs) -> RelativeVolume:
-    """Return the volume of a mechanism by several sets of points in a box about its workspace."""
-    lows, highs = mechanism.box
-    size = float(np.prod(highs - lows)) / OPTIMAL.reach**3
-    sets = (qmc.scale(_points(seed), lows, highs) for seed in range(SETS))
-    shares = [float(mechanism.holds(points, mechanism.home[1]).mean()) for points in sets]
-    error = float(np.std(shares, ddof=1)) / SETS**0.5
-    return RelativeVolume(mechanism.name, size * float(np.mean(shares)), size * error)
-
-
-def _abilities(name: str, holds: Holds, points: FloatArray, rotation: FloatArray) -> Abilities:
-    """Return the orientations of a mechanism at the first of some points in its workspace."""
-    inside = holds(points, np.broadcast_to(rotation, (len(points), 3, 3)))
-    chosen = points[inside][:POSITIONS]
+def _abilities(mechanism: _Mechanism) -> Abilities:
+    """Return the orientations of a mechanism at nodes spread over its workspace."""
+    name, rotation, region, holds = mechanism
+    nodes = nodes_of(region)
+    chosen = nodes[np.linspace(0, len(nodes) - 1, POSITIONS).astype(np.int64)]
     turns = np.asarray(Rotation.random(ORIENTATIONS, rng=np.random.default_rng(10)).as_matrix())
     shares = np.array([holds(np.tile(p, (len(turns), 1)), turns).mean() for p in chosen])
     tilts = np.array([_greatest_tilt(holds, p, rotation) for p in chosen])

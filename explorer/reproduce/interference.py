@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 
+import msgspec
 import numpy as np
 
-from explorer.legs.clearance import PAIRS, leg_clearances
-from explorer.legs.interference import step_overlaps
+from explorer.legs.clearance import PAIRS, leg_clearances, pair_rows
+from explorer.legs.interference import step_overlaps, tetrahedra_overlap
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
-from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray, for_kernel
 from explorer.reproduce.claim import Measurement, judge
-from explorer.reproduce.six_legs import six_four_twin
+from explorer.six_legged.files import six_four_twin
+from explorer.six_legged.table import SixLegged, TablePoses
 from explorer.workspace.workspace import Workspace
 
-OPTIMAL = PRESETS["paper-optimal"]
+# In units of 1 mm, as the twin beside it.
+OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=1.0)
 ROTATION = OPTIMAL.home_pose.rotation
 A2X = (5.0, 10.0, 15.0, OPTIMAL.reach)
 """Positions of a2 within the reach at which the twin is measured, in design units; the 4-4 does
@@ -70,9 +74,9 @@ def measure_risk() -> Measurement:
     four = pairs.min(axis=1)
     mechanisms = [_interference("4-4", nodes, four, four, _four_collides)]
     for a2x in (*A2X, BEYOND):
-        twin = six_four_twin(OPTIMAL, a2x)
-        six = twin.clearances(nodes, ROTATION).min(axis=1)
-        collides = partial(twin.step_overlaps, rotation=ROTATION)
+        twin = six_four_twin(OPTIMAL, a2x, BEYOND + OPTIMAL.reach)
+        six = clearances(twin, nodes).min(axis=1)
+        collides = partial(_six_collide, twin)
         mechanisms.append(_interference(twin.name, nodes, six, four, collides))
     ours, *twins, beyond = mechanisms
     apart = float(pairs[:, PAIRS.index((2, 3))].max())
@@ -169,6 +173,33 @@ def _shares_of_steps(nodes: FloatArray, collides: Collides) -> tuple[tuple[float
 def _four_collides(start: FloatArray, end: FloatArray) -> BoolArray:
     ends = (Configuration(OPTIMAL, position, ROTATION) for position in (start, end))
     return np.asarray(step_overlaps(*ends).any(axis=-1))
+
+
+def pairs_of(table: SixLegged) -> list[tuple[int, int]]:
+    """Return the pairs of legs of a table that share no joint."""
+    ends = table.base_mm, table.platform_mm
+    pairs = itertools.combinations(range(6), 2)
+    return [(i, j) for i, j in pairs if all(p[i] != p[j] for p in ends)]
+
+
+def clearances(table: SixLegged, position: FloatArray) -> FloatArray:
+    """Return the distances of the axes of its pairs at home's orientation, shape (n, m)."""
+    axes = TablePoses(table, position, ROTATION).ends
+    distance, points = np.empty((len(axes), 6)), np.empty((len(axes), 6, 2, 3))
+    found: list[FloatArray] = []
+    for i, j in pairs_of(table):
+        # The first pair of these legs.
+        pair_rows(len(axes), for_kernel(axes[:, [i, j, i, j]]), distance, points)
+        found.append(distance[:, 0].copy())
+    return np.stack(found, axis=-1)
+
+
+def _six_collide(table: SixLegged, start: FloatArray, end: FloatArray) -> BoolArray:
+    """Return whether legs of a table collide on steps by the paper's test, shape (n,)."""
+    one, two = (TablePoses(table, p, ROTATION).ends for p in (start, end))
+    swept = np.stack([one[:, :, 0], two[:, :, 0], one[:, :, 1], two[:, :, 1]], axis=-2)
+    overlaps = [tetrahedra_overlap(swept[:, i], swept[:, j]) for i, j in pairs_of(table)]
+    return np.asarray(np.any(overlaps, axis=0))
 
 
 def _table(mechanisms: Sequence[LegCollisions]) -> list[str]:

@@ -6,6 +6,7 @@ pose, and a singular pose on each path between modes.
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -17,11 +18,14 @@ from explorer.mechanism.kinematics import determinant, forward, inverse, tetrahe
 from explorer.mechanism.margins import margins, mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.reproduce import claim
-from explorer.reproduce.six_legs import six_four_twin
+from explorer.six_legged.files import six_four_twin
+from explorer.six_legged.table import TablePoses
 
 OPTIMAL = PRESETS["paper-optimal"]
 PAPER = (PRESETS["paper-initial"], OPTIMAL)
 DESIGNS, POSES, A2X = 6, 500, (5.0, 12.0, 26.0)
+# Longest legs of the twin over the reach: the lengths are compared, not limited.
+FAR = 10.0
 # Errors that count as none, of joints over the reach and of poses.
 EXACT, SAME = 1e-9, 1e-6
 # Designs and poses for the flat tetrahedra, and the errors of these that count as none.
@@ -68,12 +72,15 @@ def measure_same_kinematics() -> claim.Measurement:
         joints = inverse(design, positions, rotations)
         p, r, _ = forward(design, joints)
         for a2x in A2X:
-            twin = six_four_twin(design, a2x)
-            given = twin.lengths(positions, rotations)
-            modes = np.array([twin.lengths(p[:, k], r[:, k]) for k in range(8)])
+            # In units of 1 mm, as the twin.
+            same = msgspec.structs.replace(design, unit_mm=1.0)
+            twin = six_four_twin(same, a2x, FAR * design.reach)
+            poses = TablePoses(twin, positions, rotations)
+            given = poses.lengths
+            modes = np.array([TablePoses(twin, p[:, k], r[:, k]).lengths for k in range(8)])
             back = _joints_of(given, a2x)
             # The determinant over the margins is a constant of the design.
-            own = twin.determinant(positions, rotations) * given.prod(axis=1)
+            own = np.linalg.det(poses.jacobian) * given.prod(axis=1)
             product = margins(positions, rotations).prod(axis=-1)
             constant = float(np.median(own / product))
             off = (modes - given, back - joints, (own / constant - product) / design.reach**2)

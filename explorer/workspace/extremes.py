@@ -37,6 +37,7 @@ from explorer.workspace.limits.constraints import (
     shift,
     surface_of,
 )
+from explorer.workspace.limits.region import Region
 from explorer.workspace.workspace import Workspace
 
 # Degree of the resultant in the cosine and sine of the angle, and angles that determine it.
@@ -80,7 +81,14 @@ def extreme_positions(workspace: Workspace, normals: FloatArray) -> FloatArray:
     They are extreme along the axes and along the normals, shape (m, 3), in the whole workspace and
     on either side of the planes through a1 with these normals.
     """
-    limits, box = workspace.limits, workspace.region.box
+    return extremes_of(workspace.limits, workspace.region, workspace.design.reach, normals)
+
+
+def extremes_of(
+    limits: Sequence[Constraint], region: Region, reach: float, normals: FloatArray
+) -> FloatArray:
+    """Return `extreme_positions` of the region within limits, of a mechanism with a reach."""
+    box = region.box
     if box is None:
         return np.zeros((0, 3))
     lows, highs = box
@@ -109,7 +117,7 @@ def extreme_positions(workspace: Workspace, normals: FloatArray) -> FloatArray:
     kept = within(points, NEAR * unit)
     refined = surfaces.refine(points[kept], equations[kept], directions)
     found = np.vstack([points[kept], refined, surfaces.poles(directions)])
-    return middle + unit * found[within(found, TOLERANCE * max([workspace.design.reach, *radii]))]
+    return middle + unit * found[within(found, TOLERANCE * max([reach, *radii]))]
 
 
 @dataclass(frozen=True)
@@ -193,9 +201,11 @@ class Quadrics:
         equations = np.vstack([triples.reshape(-1, 3), stationary])
         known = np.maximum(equations, 0)
         forms = self.forms()[known]
-        # Two spheres meet in a plane.
-        spheres = (self.kind[equations[:, :2]] == SPHERE).all(axis=1)
-        forms[spheres, 1] -= forms[spheres, 0]
+        # Two spheres meet in a plane, three in the planes of two pairs.
+        are_spheres = (equations >= 0) & (self.kind[known] == SPHERE)
+        for k in (1, 2):
+            also = are_spheres[:, : k + 1].all(axis=1)
+            forms[also, k] -= forms[also, 0]
         of_curves = forms[len(triples) :]
         of_curves[:, 2] = _stationary(of_curves[:, 0], of_curves[:, 1], directions[-1 - thirds])
         size = np.abs(forms).max(axis=(2, 3), keepdims=True)

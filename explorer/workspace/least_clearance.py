@@ -37,7 +37,7 @@ from explorer.workspace.clearance_bounds import (
     bound_slacks,
     raise_bounds,
 )
-from explorer.workspace.limits.region import mark_nodes
+from explorer.workspace.limits.region import Region, mark_nodes
 from explorer.workspace.workspace import Workspace
 
 # Tolerance of a least clearance, over the reach.
@@ -269,25 +269,30 @@ def node_measures(
         InputError: Too few or too many nodes.
     """
     whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
-    region = workspace.region
-    lows, highs = region.box or (np.zeros(3), np.zeros(3))
-    step, within = (highs - lows) / nodes, np.zeros((nodes,) * 3, dtype=np.bool_)
-    if region.box is not None:
-        mark_nodes(nodes**3, *region.rows, lows + 0.5 * step, step, 0.0, within)
-    indices = np.argwhere(within)
-    if not len(indices):
+    positions = nodes_of(workspace.region, nodes)
+    if not len(positions):
         none = np.full(3, np.nan)
         clearances = np.full(len(PAIRS), math.inf)
-        return NodeMeasures(np.zeros((0, 3)), none, none, math.nan, clearances, math.nan)
-    at = workspace.at(lows + (indices + 0.5) * step)
+        return NodeMeasures(positions, none, none, math.nan, clearances, math.nan)
+    at = workspace.at(positions)
     sizes, clearance = np.abs(at.margins), leg_clearances(at).clearance
     smallest = sizes.min(axis=1)
     off_planes = clearance[smallest >= clearance_margin]
     return NodeMeasures(
         positions=at.position,
-        extent=np.ptp(indices, axis=0) * step,
+        extent=np.ptp(positions, axis=0),
         margins=sizes.min(axis=0),
         mean_margin=float(smallest.mean()),
         clearances=off_planes.min(axis=0, initial=math.inf),
         clear_share=float((clearance > 0.0).all(axis=1).mean()),
     )
+
+
+def nodes_of(region: Region, nodes: int = DEFAULT_NODES) -> FloatArray:
+    """Return the nodes in a region of a grid of so many on each axis of its box, shape (n, 3)."""
+    if region.box is None:
+        return np.zeros((0, 3))
+    lows, highs = region.box
+    step, within = (highs - lows) / nodes, np.zeros((nodes,) * 3, dtype=np.bool_)
+    mark_nodes(nodes**3, *region.rows, lows + 0.5 * step, step, 0.0, within)
+    return lows + (np.argwhere(within) + 0.5) * step

@@ -56,6 +56,7 @@ from explorer.mechanism.pose import Pose
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.optimise.outcome import Iterate, IterateRecord, Record, Run, Settings
 from explorer.optimise.problem import YAW
+from explorer.six_legged.files import TABLES
 
 OPTIMAL = PRESETS["paper-optimal"]
 MEASURED = measure_design(Case(OPTIMAL), measures_in("optimise"))
@@ -210,6 +211,7 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: compare(Optimisation.of(state).count, (MEASURED, MEASURED)),
     lambda state, i, share: accept(),
     lambda state, i, share: pin(state.design),
+    lambda state, i, share: pin(tuple(TABLES.values())[i % len(TABLES)]),
     lambda state, i, share: unpin(i % 3),
     lambda state, i, share: Change("compared.look", {"overlay": share < 0.5}),
     lambda state, i, share: brush_axes((Brush("volume", ((share, 10.0),)),)),
@@ -282,6 +284,7 @@ def rich_state() -> State:
         Change("paths", {"stops": (Stop(home), Stop(beyond)), "kind": "planned", "chosen": 1}),
         Change("paths", {"law": "duration", "duration": 0.5, "slower": 10.0, "holds_load": True}),
         pin(OPTIMAL),
+        pin(TABLES["octahedral"]),
         Change("compared", {"look": varied(CompareView())}),
         Set("studies", varied(Studies())),
         Set("calibrated", Calibrated("l1;é\n1", "x,y,z\n", 1 / 3, 1 / 7)),

@@ -16,7 +16,7 @@ from hypothesis import given, strategies as st
 from limited_designs import scaled_design
 from services import StubJobs, services_for
 
-from explorer.app.features.compare.feature import ComparePanel, pin, unpin
+from explorer.app.features.compare.feature import COMPARE, ComparePanel, pin, unpin
 from explorer.app.features.compare.scene import APART, SCENES
 from explorer.app.features.compare.table import (
     ComparedDesign,
@@ -40,13 +40,14 @@ from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import COMPARED
+from explorer.app.session.history import History, HistoryStep
 from explorer.app.state.actions import Set, open_design
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import set_variable, without_name
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State, open_state
 from explorer.app.storage.library import Library
-from explorer.app.storage.session_file import SessionFile
+from explorer.app.storage.session_file import SessionFile, decode_session, encode_session
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
@@ -58,6 +59,8 @@ from explorer.mechanism.machine import Actuators, Guide, Payload
 from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import Unit
 from explorer.page.widgets.assigning import Assigner
+from explorer.six_legged.case import TableCase
+from explorer.six_legged.files import TABLES, made_equal
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.slices.volume import node_count_of, workspace_volume
 from explorer.workspace.workspace import Workspace
@@ -401,6 +404,7 @@ def test_design_is_pinned_by_one_press(services: Services, desk: Desk) -> None:
     assert re.findall('data-press="compare.pin" data-value="([^"]*)"', words) == [
         "buildable",
         "paper-initial",
+        *TABLES,
     ]
     for name in ("paper-initial", "nothing of this name"):
         desk.press(services.buttons, "compare.pin", name)
@@ -409,3 +413,85 @@ def test_design_is_pinned_by_one_press(services: Services, desk: Desk) -> None:
     desk.session.do(open_design(msgspec.structs.replace(OPTIMAL, name="other")))
     assert 'data-value="paper' not in content_of(panel, desk.state)
     assert desk.complaints == []
+
+
+def test_tables_on_six_legs_stand_beside_designs(services: Services, desk: Desk) -> None:
+    panel, jobs = ComparePanel(services), services.jobs
+    assert isinstance(jobs, StubJobs)
+    desk.press(services.buttons, "compare.pin", "octahedral")
+    desk.press(services.buttons, "compare.pin", "paper-initial")
+    desk.press(services.buttons, "compare.pin", "octahedral")
+    table = TABLES["octahedral"]
+    assert Compared.of(desk.state).places == (table, INITIAL, None)
+    assert 'data-value="octahedral"' not in content_of(panel, desk.state)
+    desk.press(services.buttons, "compare.open", "A")
+    assert desk.state.design == OPTIMAL
+    twice, unopened = desk.complaints
+    assert "octahedral is pinned already, as A" in twice
+    assert "nothing is pinned as A" in unopened
+    desk.session.do(Set("view.lengths", "mm"))
+    desk.press(services.buttons, "compare.turn", "Outlines")
+    desk.press(services.buttons, "compare.turn", "Overlay workspaces")
+    found = [services.get(feed) for feed in FEEDS]
+    follow(found, desk.state)
+    jobs.work()
+    content = content_of(panel, desk.state)
+    assert "Make octahedral the live design" not in content
+    assert "the sign of det J is no assembly mode of a table" in content
+    assert "D. Stewart" in content
+    rows = cells(content)
+    case = TableCase(table)
+    assert number(rows["volume cm³"][1]) == pytest.approx(1e-3 * case.volume.volume, rel=1e-6)
+    assert number(rows["largest force per newton at home"][1]) == pytest.approx(0.619, abs=1e-3)
+    assert rows["clearance mm"][1] == rows["b2 mm"][1] == "–"
+    placed, scene = Placed(Frame(desk.state)), services.get(SCENES[1])
+    Assigner(services.server).assign(scene.updates(placed))
+    shown = {handle.name for handle, name, on in scene.updates(placed) if name == "visible" and on}
+    assert shown == {"/compared/A/outline"}
+    lines = [value for _, name, value in scene.updates(placed) if name == "points"]
+    millimetre = placed.scale / OPTIMAL.unit_mm
+    assert np.asarray(lines[0])[0, 0] == pytest.approx(millimetre * np.array(table.base_mm[0]))
+    # Session files hold tables as they hold designs.
+    history = History((HistoryStep(0, "", desk.state),), 0)
+    assert decode_session(encode_session(history), "it").steps[0].state == desk.state
+
+
+def test_pinned_tables_are_made_equal_to_the_live_design(services: Services, desk: Desk) -> None:
+    panel = ComparePanel(services)
+    desk.press(services.buttons, "compare.turn", "Equal strokes and cones")
+    desk.press(services.buttons, "compare.pin", "two circles")
+    desk.press(services.buttons, "compare.turn", "Equal strokes and cones")
+    (table, *_) = Compared.of(desk.state).tables
+    assert table == made_equal(TABLES["two circles"], OPTIMAL)
+    words = "made equal to paper-optimal: strokes of 204.2 mm about home's lengths, no cones"
+    assert unescape(content_of(panel, desk.state)).count(words) == 1
+    desk.press(services.buttons, "compare.turn", "Equal strokes and cones")
+    assert Compared.of(desk.state).tables[0] == table
+    desk.press(services.buttons, "compare.unpin", "A")
+    assert Compared.of(desk.state).is_empty
+
+
+def test_table_that_is_dropped_is_pinned(
+    server: viser.ViserServer, desk: Desk, buttons: Buttons, tmp_path: Path
+) -> None:
+    user_data = UserData(Library(tmp_path / "designs"), SessionFile())
+    page = services_for(
+        server,
+        desk.session,
+        buttons=buttons,
+        complain=desk.complain,
+        user_data=user_data,
+        declared=(COMPARE,),
+    )
+    saved = page.get(SavedDesigns)
+    for data, name in (
+        (msgspec.json.encode(TABLES["Dietmaier"]), "dietmaier.json"),
+        (b"setp genhexkins.base.0.x -30\n", "machine.hal"),
+        (b"loadrt trivkins\n", "other.HAL"),
+    ):
+        saved.take(data, name)
+        assert saved.wait_until_idle()
+    tables = Compared.of(desk.state).tables
+    assert [table and table.name for table in tables] == ["Dietmaier", "genhexkins", None]
+    (complaint,) = desk.complaints
+    assert complaint.startswith("other.HAL: the file holds no table on six legs")

@@ -31,6 +31,7 @@ ROOMS = (
     "statics",
     "workspace",
     "measures",
+    "six_legged",
     "prototype",
     "paths",
     "optimise",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any, get_args
 
@@ -25,8 +26,10 @@ from explorer.reproduce import comparison, flags, interference
 from explorer.reproduce.claim import Result, Verdict, random_poses
 from explorer.reproduce.claims import CLAIMS, measure_claims
 from explorer.reproduce.kinematics import conditions_at_crossings, paths_at, random_paths
-from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
 from explorer.singularity.freedoms import UNCOUPLED
+from explorer.six_legged.case import TableCase
+from explorer.six_legged.files import TABLES, six_four_twin
+from explorer.six_legged.table import TablePoses
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
 from explorer.workspace.orientations.share import orientation_share
@@ -138,42 +141,21 @@ def test_table_one_is_the_printed_one(results: dict[str, Result]) -> None:
     assert values["nodes_by_yaw"]["-90"] == 1067
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_clearances_of_the_twin_are_distances_of_its_legs_from_point_to_point(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    twin = six_four_twin(OPTIMAL, float(random.uniform(4.0, 20.0)))
-    position = random.uniform((2.0, 0.0, 3.0), (18.0, 12.0, 15.0), (1, 3))
-    rotation = np.asarray(Rotation.random(rng=random).as_matrix())
-    axes = twin.axes(position, rotation)[0]
-    found = twin.clearances(position, rotation)[0]
-    assert len(twin.pairs) == 15 - 6
+@pytest.mark.parametrize("a2x", [5.0, 18.0])
+def test_clearances_of_the_twin_are_distances_of_its_legs_from_point_to_point(a2x: float) -> None:
+    twin, rotation = six_four_twin(interference.OPTIMAL, a2x), OPTIMAL.home_pose.rotation
+    position = np.random.default_rng(1).uniform((2.0, 0.0, 3.0), (18.0, 12.0, 15.0), (1, 3))
+    axes = TablePoses(twin, position, rotation).ends[0]
+    found = interference.clearances(twin, position)[0]
+    pairs = interference.pairs_of(twin)
+    assert len(pairs) == 15 - 6
     work = np.empty((2, 3))
-    expected = [write_closest(axes[i], axes[j], work) for i, j in twin.pairs.tolist()]
+    expected = [write_closest(axes[i], axes[j], work) for i, j in pairs]
     np.testing.assert_allclose(found, expected, atol=1e-12)
     home = OPTIMAL.home_pose
-    twin = six_four_twin(OPTIMAL, 12.0)
     points = Configuration(OPTIMAL, home.position, home.rotation).points
-    axes = twin.axes(np.array(home.position)[None], home.rotation)[0]
-    for leg, tip in zip(axes, ("b1", "b2", "b3", "b2", "b3", "b4"), strict=True):
+    for leg, tip in zip(twin.home_poses.ends, ("b1", "b2", "b3", "b2", "b3", "b4"), strict=True):
         np.testing.assert_allclose(leg[1], getattr(points, tip), atol=1e-12)
-
-
-@pytest.mark.parametrize("mechanism", [six_four_twin(OPTIMAL, 12.0), octahedral(OPTIMAL)])
-def test_determinant_is_that_of_the_rates_of_the_lengths(mechanism: SixLegs) -> None:
-    random = np.random.default_rng(1)
-    position = random.uniform(2.0, 15.0, 3)
-    rotation = np.asarray(Rotation.random(rng=random).as_matrix())
-
-    def lengths(twist: FloatArray) -> FloatArray:
-        turned = Rotation.from_rotvec(twist[3:]).as_matrix() @ rotation
-        axes = mechanism.axes((position + twist[:3])[None], turned)[0]
-        return np.linalg.norm(axes[:, 1] - axes[:, 0], axis=-1)
-
-    step = 1e-6
-    rates = [(lengths(step * unit) - lengths(-step * unit)) / (2 * step) for unit in np.eye(6)]
-    expected = np.linalg.det(np.column_stack(rates))
-    found = mechanism.determinant(position[None], rotation[None])[0]
-    assert found == pytest.approx(expected, rel=1e-5, abs=1e-6)
 
 
 def test_compared_mechanisms_have_actuators_of_one_stroke() -> None:
@@ -186,9 +168,9 @@ def test_compared_mechanisms_have_actuators_of_one_stroke() -> None:
         turned = np.broadcast_to(rotation, (len(position), 3, 3))
         kept = inverse(OPTIMAL, position, rotation)[comparison.four_four(position, turned)]
         assert (np.ptp(kept, axis=0) <= reach).all()
-    for mechanism in (six_four_twin(OPTIMAL, 12.0), octahedral(OPTIMAL)):
-        held = mechanism.holds(position, mechanism.home[1])
-        assert (mechanism.lengths(position[held], mechanism.home[1]) <= reach).all()
+    for table in (*comparison.TWINS, comparison.two_circles(0.4, 0.6, 15.0)):
+        assert table.shortest_mm == (0.0,) * 6
+        assert table.longest_mm == (reach,) * 6
 
 
 def test_share_of_the_four_four_is_that_of_its_own_measure() -> None:
@@ -197,29 +179,22 @@ def test_share_of_the_four_four_is_that_of_its_own_measure() -> None:
     assert share == pytest.approx(orientation_share(OPTIMAL, (10.0, 5.0, 9.0)).share, abs=6e-3)
 
 
-@pytest.mark.parametrize("mechanism", [six_four_twin(OPTIMAL, 12.0), octahedral(OPTIMAL)])
-def test_box_holds_the_workspace_and_is_the_least_one_for_the_lengths(mechanism: SixLegs) -> None:
-    reach, rotation = OPTIMAL.reach, mechanism.home[1]
-    points = np.random.default_rng(0).uniform(-2.0 * reach, 2.0 * reach, (20_000, 3))
-    kept = points[(mechanism.lengths(points, rotation) <= mechanism.longest).all(axis=1)]
-    lows, highs = mechanism.box
-    assert (kept >= lows).all()
-    assert (kept <= highs).all()
-
-
-def test_volume_of_the_twin_is_that_of_a_plain_count(results: dict[str, Result]) -> None:
+def test_volumes_are_those_of_a_plain_count(results: dict[str, Result]) -> None:
     values: Any = results["workspace"].measurement.values
-    for mechanism, told in zip(
-        (six_four_twin(OPTIMAL, OPTIMAL.reach), octahedral(OPTIMAL)),
-        values["mechanisms"][2:5:2],
-        strict=True,
+    told = {each["name"]: each["volume"] for each in values["mechanisms"]}
+    reach, home = OPTIMAL.reach, OPTIMAL.home_pose
+    axis = np.arange(-1.1 * reach, 1.1 * reach, 0.5)
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    signs = np.sign(margins(home.position, home.rotation))
+    of_mode = (np.sign(margins(grid, home.rotation)) == signs).all(axis=1)
+    twin, table = comparison.TWINS[1], comparison.two_circles(0.4, 0.6, 15.0)
+    for mechanism, rotation, kept in (
+        (twin, home.rotation, of_mode),
+        (table, np.eye(3), grid[:, 2] > 0.0),
     ):
-        lows, highs = mechanism.box
-        axes = [np.arange(low + 0.25, high, 0.5) for low, high in zip(lows, highs, strict=True)]
-        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        count = int(mechanism.holds(grid, mechanism.home[1]).sum())
-        assert told["volume"] == pytest.approx(count * 0.5**3 / OPTIMAL.reach**3, rel=0.02)
-        assert 0.0 < told["error"] < 2e-3
+        count = int((TableCase(mechanism).holds(grid, rotation) & kept).sum())
+        expected = count * 0.5**3 / reach**3
+        assert told[mechanism.name] == pytest.approx(expected, rel=0.02)
 
 
 def test_legs_2_and_3_are_as_far_apart_as_their_carriages(results: dict[str, Result]) -> None:
@@ -261,7 +236,7 @@ def test_path_that_stays_in_a_mode_has_no_singular_pose() -> None:
     assert conditions_at_crossings(*path)[0] > 1e-3
 
 
-def test_command_writes_the_keys_of_the_contract_and_refuses_an_unknown_claim(
+def test_command_writes_the_keys_of_the_contract(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     cli = CommandLine(capsys, has_progress=True)
@@ -269,5 +244,26 @@ def test_command_writes_the_keys_of_the_contract_and_refuses_an_unknown_claim(
     keys = {"claim", "reading", "paper", "measured", "verdict", "command"}
     assert [keys <= claim.keys() for claim in found["claims"]] == [True, True]
     assert cli.text("reproduce", "--claim", "strata").startswith("CONFIRMED")
+
+
+def test_command_measures_tables_beside_the_optimum(capsys: pytest.CaptureFixture[str]) -> None:
+    cli = CommandLine(capsys)
+    found = cli.answer("reproduce", "--beside", "octahedral")
+    case = TableCase(TABLES["octahedral"])
+    assert found["claims"] == []
+    assert found["beside"]["volume_mm3"] == pytest.approx(case.volume.volume, rel=1e-12)
+    forces = float(case.home_indices.force_per_newton)
+    assert found["beside"]["force_per_newton"] == pytest.approx(forces, rel=1e-12)
+    assert found["beside"]["longest_leg_mm"] == 380.0
+    names = ("octahedral", "LinuxCNC default")
+    several = cli.answer("reproduce", "--beside", *names, "--equal")["beside"]
+    assert [each["name"] for each in several] == [*names]
+    text = cli.text("reproduce", "--beside", "octahedral")
+    assert re.search(r"global transmission index +0\.16550\d +0\.90940\d", text)
+    assert "the sign of det J is no assembly mode of a table" in " ".join(text.split())
+    assert "the tables are Dietmaier" in cli.refusal("reproduce", "--beside", "no-such-table")
+
+
+def test_unknown_claim_is_refused() -> None:
     with pytest.raises(InputError, match="no claim 'nothing'; there are same-kinematics"):
         list(measure_claims(["nothing"]))

@@ -30,7 +30,7 @@ from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.margins import planes_of_singularity
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.workspace.extremes import extent_of, extreme_positions, least_margins
+from explorer.workspace.extremes import extent_of, extreme_positions, extremes_of, least_margins
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
@@ -258,3 +258,33 @@ def test_extent_of_ball_cut_at_its_top_is_that_of_the_cut() -> None:
         extent_of(Workspace(limited(design, box=((-2.0, 3.0, 1.1), (2.0, 7.0, 2.0))), quarter))
         is None
     )
+
+
+@pytest.mark.parametrize(("platform", "shortest"), [(100.0, 0.0), (140.0, 250.0), (60.0, 250.0)])
+def test_extremes_of_balls_that_meet_by_symmetry_are_found(
+    platform: float, shortest: float
+) -> None:
+    # The balls of an octahedral table: six centres in a plane, and extremes on three of them.
+    longest, corners = 400.0, 2.0 * math.pi / 3.0 * np.array([0, 1, 1, 2, 2, 0])
+    tips = math.pi / 3.0 * np.array([1, 1, 3, 3, 5, 5])
+    centres = 200.0 * np.exp(1j * corners) - platform * np.exp(1j * tips)
+    limits = [
+        BallOrCylinder(f"{k} {inside}", np.array([c.real, c.imag, 0.0]), radius, True, inside)
+        for k, c in enumerate(centres.tolist())
+        for radius, inside in ((longest, True), (shortest, False))
+        if radius
+    ]
+    points = extremes_of(limits, region_of(limits), longest, NO_NORMALS)
+    assert slacks(limits, points).min() >= -1e-6
+    # On the axis all six legs are longest.
+    highest = math.sqrt(longest**2 - abs(centres[0]) ** 2)
+    assert points[:, 2].max() == pytest.approx(highest, rel=1e-12)
+    assert points[:, 2].min() == pytest.approx(-highest, rel=1e-12)
+    random = np.random.default_rng(0).uniform(-longest, longest, (1_000_000, 3))
+    kept = random[(slacks(limits, random) >= 0.0).all(axis=1)]
+    beyond = np.maximum(
+        kept.max(axis=0) - points.max(axis=0), points.min(axis=0) - kept.min(axis=0)
+    )
+    assert beyond.max() <= 0.0
+    # Nor are they far beyond it.
+    assert (np.ptp(kept, axis=0) >= 0.95 * np.ptp(points, axis=0)).all()

@@ -13,7 +13,7 @@ A length that stays keeps its value in the unit that the page shows, millimetres
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -54,8 +54,11 @@ def without_machine(design: Design) -> Design:
     return with_machine(design, ideal, View())
 
 
-def without_name(design: Design) -> Design:
-    """Return a design without its name, on which nothing else depends."""
+Named = TypeVar("Named", bound=msgspec.Struct)
+
+
+def without_name(design: Named) -> Named:
+    """Return a design or a table without its name, on which nothing else depends."""
     return msgspec.structs.replace(design, name="untitled")
 
 

@@ -12,7 +12,7 @@ orientations.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -155,9 +155,19 @@ def orientation_share(
     are those of `orientations_within`.
     """
     p, t = one_position(position), one_tool(tool)
+    return share_of(lambda rotations: _are_within(design, p, rotations, t), n, seed)
+
+
+def share_of(
+    are_within: Callable[[FloatArray], BoolArray], n: int = CAPABILITY_ORIENTATIONS, seed: int = 0
+) -> OrientationShare:
+    """Return the share of orientations that are within limits, as `orientation_share` does.
+
+    The function tells which rotations (n, 3, 3) are, shape (n,).
+    """
     n = whole("the number of orientations", n, 2, MOST_ORIENTATIONS)
     rotations, sizes = _even_sets(n, whole("the seed", seed, 0, 2**63))
-    within = _are_within(design, p, rotations, t)
+    within = are_within(rotations)
     shares = np.add.reduceat(within.astype(np.int64), np.cumsum(sizes) - sizes) / sizes
     share = float(within.mean())
     # The sets differ in size by one orientation at the most.

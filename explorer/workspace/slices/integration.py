@@ -16,7 +16,7 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.compiled import MANY_ROWS, helper, kernel
 from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, Region, X, Y, Z
 from explorer.workspace.slices.arcs import (
     LENGTH,
@@ -36,6 +36,8 @@ MOST_BREAKS, MOST_PIECES = 1000, 1100
 MOST_ARCS = 64
 # Largest number of surfaces of a region, each of which covers a circle in two arcs at most.
 MOST_SURFACES = MOST_ARCS // 2
+# The most circles of a design, of two for each leg.
+FEW_CIRCLES = 8
 # The count of slices from which on no piece is halved.
 MOST_SLICES = 2000
 # Pieces are halved down to these errors, as shares of the volume and of the surface.
@@ -249,7 +251,9 @@ def volume_of_slices(region: Region) -> tuple[float, float, dict[str, float]]:
         )
     result, rates = np.zeros(RESULTS), np.zeros((len(surfaces), 4))
     ends = region.low, region.high
-    integrate_slices(1, region.circles, region.planes, *ends, quadrature(), result, rates)
+    # With the twelve balls of six legs it takes seconds if it is not compiled.
+    rows = MANY_ROWS if len(region.circles) > FEW_CIRCLES else 1
+    integrate_slices(rows, region.circles, region.planes, *ends, quadrature(), result, rates)
     # An end that moves by dx sweeps the area of its slice; its normal is along x.
     areas = (region.low_limit, result[AREA_AT_LOW]), (region.high_limit, result[AREA_AT_HIGH])
     of_ends = [

@@ -11,7 +11,7 @@ import viser
 
 from explorer.app.features.compare.scene import SCENES
 from explorer.app.features.compare.table import ComparedDesign, columns_of, notes, table
-from explorer.app.features.compare.work import FEEDS, SLOTS, Compared
+from explorer.app.features.compare.work import FEEDS, SLOTS, Comparable, Compared
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.session.session import Change
@@ -24,21 +24,22 @@ from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chips, StateCommand, turn
 from explorer.app.widgets.markup import box
 from explorer.errors import InputError
-from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.page.widgets.assigning import Update
+from explorer.six_legged.files import FIELD, TABLES, decode_table, made_equal
+from explorer.six_legged.table import SixLegged
 
 # Largest number of designs that have a button of their own: the presets, then the last saved.
 MOST_BUTTONS = 12
 
 
-def _pin_words(_: State, design: Design) -> str:
+def _pin_words(_: State, design: Comparable) -> str:
     return f"Pin {design.name}"
 
 
 @action(_pin_words)
-def pin(state: State, design: Design) -> State:
-    """Pin a copy of a design beside the live one, in the first free place.
+def pin(state: State, design: Comparable) -> State:
+    """Pin a copy of a design or a table on six legs beside the live one, in the first free place.
 
     Raises:
         InputError: The design is pinned already, or there is no free place.
@@ -48,12 +49,13 @@ def pin(state: State, design: Design) -> State:
         raise InputError(
             f"{design.name} is pinned already, as {SLOTS[slot]}; change it, or pin another design"
         )
-    if None not in compared.pinned:
+    if None not in compared.places:
         places = ", ".join(SLOTS)
         raise InputError(
             f"{design.name} cannot be pinned: {places} are taken; unpin one of them first"
         )
-    return with_value(state, f"compared.pinned.{compared.pinned.index(None)}", design)
+    kind = "tables" if isinstance(design, SixLegged) else "pinned"
+    return with_value(state, f"compared.{kind}.{compared.places.index(None)}", design)
 
 
 def _unpin_words(_: State, slot: int) -> str:
@@ -63,7 +65,22 @@ def _unpin_words(_: State, slot: int) -> str:
 @action(_unpin_words)
 def unpin(state: State, slot: int) -> State:
     """Remove the pinned design from a place, 0 to 2; do nothing if the place is free."""
-    return with_value(state, f"compared.pinned.{slot}", None)
+    cleared = with_value(state, f"compared.pinned.{slot}", None)
+    return with_value(cleared, f"compared.tables.{slot}", None)
+
+
+@action("Give pinned tables the strokes and cones of {design}")
+def make_equal(state: State) -> State:
+    """Give the pinned tables the stroke and the cones of the live design."""
+    tables = Compared.of(state).tables
+    equal = tuple(each and made_equal(each, state.design) for each in tables)
+    return with_value(state, "compared.tables", equal)
+
+
+def open_table(_: Services, data: bytes, name: str) -> tuple[Action, str]:
+    """Return the action that pins the table in a file, and what it is; see `Opener`."""
+    table = decode_table(data, name)
+    return pin(table), f"The table on six legs {table.name}, pinned in Compare."
 
 
 LOOKS = {
@@ -85,6 +102,14 @@ LOOKS = {
             "Outline base, legs and platform of the pinned designs in their home poses.",
         ),
     )
+} | {
+    "Equal strokes and cones": StateCommand(
+        "Compare › Equal strokes and cones",
+        "Give the pinned tables on six legs the longest stroke of the live design's legs about "
+        "their lengths at home, and its least swing as cones; undo brings theirs back.",
+        lambda _: make_equal(),
+        is_ready=lambda state: any(Compared.of(state).tables),
+    )
 }
 
 
@@ -95,16 +120,23 @@ def _open(slot: int, state: State) -> Action:
     return open_design(design)
 
 
-PLACE_BUTTONS: tuple[tuple[str, Callable[[int, State], Action], str, str], ...] = (
-    ("open", _open, "Open pinned", "Make it the live design; undo brings back the present one."),
+PLACE_BUTTONS: tuple[tuple[str, Callable[[int, State], Action], str, str, str], ...] = (
+    (
+        "open",
+        _open,
+        "Open pinned",
+        "Make it the live design; undo brings back the present one.",
+        "pinned",
+    ),
     (
         "unpin",
         lambda slot, _: unpin(slot),
         "Unpin",
         "Remove it from the comparison; undo brings it back.",
+        "places",
     ),
 )
-"""Name, action, words and hint of the buttons of each pinned design."""
+"""Name, action, words, hint and places of the buttons of each pinned design."""
 
 
 class ComparePanel:
@@ -136,29 +168,32 @@ class ComparePanel:
             "Compare › Pin this design",
             "Keep a copy of the live design as it is now, to compare it with what it becomes.",
             "compare.pin",
-            is_ready=lambda: None in Compared.of(self._session.state).pinned,
+            is_ready=lambda: None in Compared.of(self._session.state).places,
         )
-        for verb, change, words, hint in PLACE_BUTTONS:
+        for verb, change, words, hint, among in PLACE_BUTTONS:
             commands = {
                 place: StateCommand(
                     f"Compare › {words} design {place}",
                     hint,
                     partial(change, slot),
-                    is_ready=lambda state, slot=slot: Compared.of(state).pinned[slot] is not None,
+                    is_ready=lambda state, slot=slot, among=among: (
+                        getattr(Compared.of(state), among)[slot] is not None
+                    ),
                 )
                 for slot, place in enumerate(SLOTS)
             }
             Chips(services.buttons, services.session, f"compare.{verb}", "", commands)
 
     def _page(
-        self, state: State, columns: tuple[ComparedDesign, ...], choices: Mapping[str, Design]
+        self, state: State, columns: tuple[ComparedDesign, ...], choices: Mapping[str, Comparable]
     ) -> str:
         compared, pins = Compared.of(state), _pin_buttons(state, choices)
         if compared.is_empty:
             return box(
                 '<div class="ex-before">Pin this design, then change it: the copy stays beside it. '
-                "Or pin another one to compare this design with it. Up to three can be pinned; "
-                "their workspaces can be drawn over one another.</div>",
+                "Or pin another one, or a table on six legs, to compare this design with it. Up to "
+                "three can be pinned; the workspaces of designs can be drawn over one "
+                "another.</div>",
                 f'<div class="ex-flow">{pins}</div>',
             )
         remarks = "".join(
@@ -171,12 +206,13 @@ class ComparePanel:
             remarks,
         )
 
-    def _choices(self) -> dict[str, Design]:
-        """Return the designs with a button, by name; no saved design has the name of a preset."""
+    def _choices(self) -> dict[str, Comparable]:
+        """Return designs and tables with a button, by name; a design comes before its namesake."""
         entries = () if self._library is None else self._library.entries
         own = (entry.design for entry in entries if entry.design is not None)
         named = {**PRESETS, **{design.name: design for design in own}}
-        return dict(itertools.islice(named.items(), MOST_BUTTONS))
+        designs = dict(itertools.islice(named.items(), MOST_BUTTONS))
+        return designs | {name: table for name, table in TABLES.items() if name not in designs}
 
     def _pin(self, name: str) -> Change | None:
         """Return the action that pins the named design, or the live one for ""."""
@@ -184,10 +220,10 @@ class ComparePanel:
         return None if name and chosen is None else lambda state: pin(chosen or state.design)
 
 
-def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
+def _pin_buttons(state: State, choices: Mapping[str, Comparable]) -> str:
     """Return the buttons that pin the live design and others, as HTML."""
     compared = Compared.of(state)
-    is_full = None not in compared.pinned
+    is_full = None not in compared.places
     hint = "All three places are taken: unpin one first" if is_full else "Keep a copy as it is now"
     look, words = "ex-chip is-main", "Pin this design"
     live = press_button("compare.pin", "", words, hint=hint, class_name=look, is_disabled=is_full)
@@ -214,4 +250,5 @@ COMPARE = Feature(
     tabs=(Tab("work", "Compare", ComparePanel, viser.Icon.COLUMNS_3),),
     scene=SCENES,
     feeds=FEEDS,
+    openers=dict.fromkeys((FIELD, ".hal"), open_table),
 )

@@ -7,17 +7,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from explorer.app.features.compare.work import LIVE, NAMES, Compared, CompareFeed, drawing_in
+from explorer.app.features.compare.work import (
+    LIVE,
+    NAMES,
+    Comparable,
+    Compared,
+    CompareFeed,
+    drawing_in,
+)
 from explorer.app.scene.shapes import COMPARED
 from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
 from explorer.measures.blocks.block import Look
-from explorer.measures.catalogue import Measure, Measurements, measures_in
+from explorer.measures.catalogue import Measure, Measured, measures_in
 from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics import number_text
 from explorer.numerics.number_text import Unit
+from explorer.six_legged.case import OF_TABLES
+from explorer.six_legged.table import SixLegged
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
@@ -38,15 +47,15 @@ FIRSTS = (
 
 @dataclass(frozen=True)
 class ComparedDesign:
-    """A design in the comparison, by the number of its column; 0 is the live design.
+    """A design or a table in the comparison, by the number of its column; 0 is the live design.
 
     Its measures are None until they are computed. The unit of lengths has one name in all
     columns, and the problem says why something is missing.
     """
 
     number: int
-    design: Design
-    measured: Measurements | None
+    design: Comparable
+    measured: Measured | None
     unit: Unit
     is_current: bool = True
     problem: str | None = None
@@ -84,7 +93,7 @@ class ComparedDesign:
 def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[ComparedDesign, ...]:
     """Return the columns of the live design and of the pinned ones, given the feed of each."""
     columns: list[ComparedDesign] = []
-    designs = (state.design, *Compared.of(state).pinned)
+    designs = (state.design, *Compared.of(state).places)
     for number, (design, feed) in enumerate(zip(designs, feeds, strict=True)):
         if design is not None:
             drawing = drawing_in(number, feed)
@@ -107,6 +116,10 @@ def notes(state: State, columns: tuple[ComparedDesign, ...]) -> list[str]:
         if column.measured is not None and column.measured.empty_because:
             causes = ", ".join(map(escape, column.measured.empty_because))
             remarks.append(f"{who} has an empty workspace; emptied by: {causes}.")
+        if isinstance(column.design, SixLegged) and column.design.source:
+            remarks.append(f"{who}: {escape(column.design.source.removeprefix('; '))}.")
+    if any(isinstance(column.design, SixLegged) for column in columns):
+        remarks.append(OF_TABLES)
     if state.view.lengths != "mm" and len({column.design.unit_mm for column in columns}) > 1:
         remarks.append(
             "Lengths are in units of the live design, of "
@@ -165,7 +178,9 @@ def _head(column: ComparedDesign) -> str:
     name = escape(column.design.name)
     beside = '<span class="ex-dim ex-small">as it is</span>'
     if column.number != LIVE:
-        beside = _link(column, "open", "Open", f"Make {column.design.name} the live design")
+        beside = ""
+        if isinstance(column.design, Design):
+            beside = _link(column, "open", "Open", f"Make {column.design.name} the live design")
         beside += _link(column, "unpin", "×", f"Unpin {column.design.name}")
     wait = "" if column.is_current else ' <span class="ex-dim">…</span>'
     # The differences to the live design have a column of their own.
@@ -243,5 +258,7 @@ def _exact_text(measure: Measure, column: ComparedDesign) -> str:
         return value_text(measure, value, value)
     if measure.power == 0:
         return column.unit_of(measure).text(value, 12)
-    size, units = column.design.reach**3, (number_text.UNITS, column.design.millimetres)
+    size, units = column.design.reach**3, [number_text.UNITS, column.design.millimetres]
+    # The unit of a table is the millimetre.
+    units = units[isinstance(column.design, SixLegged) :]
     return " = ".join(unit.to_power(measure.power, size).text(value, 12) for unit in units)

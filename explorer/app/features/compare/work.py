@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TypeAlias
 
+import numpy as np
+
 from explorer.app.features.workspace.work import LIVE_TOLERANCE
 from explorer.app.scene.placing import outline
 from explorer.app.scene.surfaces import Shell
@@ -19,19 +21,23 @@ from explorer.app.state.geometry import without_name
 from explorer.app.state.parts import FeaturePart
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
-from explorer.measures.catalogue import Measurements, measure_design, measures_in
+from explorer.measures.catalogue import Measured, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
+from explorer.six_legged.case import TableCase
+from explorer.six_legged.table import SixLegged
 from explorer.workspace.solids.solids import whole_solid
 
 SLOTS = ("A", "B", "C")
 """Names of the places for pinned designs."""
 
 Pinned: TypeAlias = tuple[Design | None, Design | None, Design | None]
+Tables: TypeAlias = tuple[SixLegged | None, SixLegged | None, SixLegged | None]
+Comparable: TypeAlias = Design | SixLegged
 
 
 @dataclass(frozen=True)
@@ -44,25 +50,29 @@ class CompareView:
 
 @dataclass(frozen=True)
 class Compared(FeaturePart, name="compared"):
-    """The designs that the live one is compared with, and how.
+    """The designs and tables on six legs that the live design is compared with, and how.
 
-    Copies of designs are pinned in the order of `SLOTS`; None where a place is free.
+    Copies are pinned in the order of `SLOTS`: a place has a design, a table or neither.
     """
 
     pinned: Pinned = (None, None, None)
     look: CompareView = CompareView()
+    tables: Tables = (None, None, None)
+
+    @property
+    def places(self) -> tuple[Comparable | None, ...]:
+        """What is pinned in each place, a design or a table."""
+        return tuple(a or b for a, b in zip(self.pinned, self.tables, strict=True))
 
     @property
     def is_empty(self) -> bool:
         """Whether nothing is pinned."""
-        return not any(self.pinned)
+        return not any(self.places)
 
-    def slot_of(self, design: Design) -> int | None:
+    def slot_of(self, design: Comparable) -> int | None:
         """Return the index of the place of a design under any name; None if it is not pinned."""
         plain = without_name(design)
-        slots = (
-            i for i, pinned in enumerate(self.pinned) if pinned and without_name(pinned) == plain
-        )
+        slots = (i for i, each in enumerate(self.places) if each and without_name(each) == plain)
         return next(slots, None)
 
 
@@ -76,12 +86,12 @@ NO_COLOUR: Rgb = (0, 0, 0)
 
 @dataclass(frozen=True)
 class ComparedRequest:
-    """Request to measure a design, and to draw its workspace; lengths in design units.
+    """Request to measure a design or a table, and to draw its workspace; lengths in its units.
 
-    The chord tolerance of its mesh is a share of the reach if None.
+    Only that of a design is drawn. The chord tolerance of its mesh is a share of the reach if None.
     """
 
-    design: Design
+    design: Comparable
     drawn: bool = False
     tolerance: float | None = None
 
@@ -95,7 +105,7 @@ class ComparedDrawing:
     """
 
     request: ComparedRequest
-    measurements: Measurements | None
+    measurements: Measured | None
     shell: Shell | None
     outline: FloatArray
     problem: str | None = None
@@ -103,13 +113,20 @@ class ComparedDrawing:
     def offset(self, at: Point) -> FloatArray:
         """Return the vector from b4 to a point in the orientation of home, shape (3,)."""
         design = self.request.design
+        if isinstance(design, SixLegged):
+            return np.zeros(3)
         return offset_of(design, design.home_pose.rotation, at)
 
 
 def draw_compared(request: ComparedRequest) -> ComparedDrawing:
     """Return the measurements of a design, and its workspace if requested."""
     design = request.design
-    measurements: Measurements | None = None
+    if isinstance(design, SixLegged):
+        base, platform = np.moveaxis(design.home_poses.ends, 1, 0)
+        rings = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in (base, platform)]
+        lines = np.concatenate([design.home_poses.ends, *rings])
+        return ComparedDrawing(request, _kept_table(design).measured, None, lines)
+    measurements: Measured | None = None
     shell: Shell | None = None
     problem: str | None = None
     try:
@@ -127,6 +144,7 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
 
 _kept_case = lru_cache(maxsize=CACHED)(Case)
 """The case of a design, with all that has been computed of it."""
+_kept_table = lru_cache(maxsize=CACHED)(TableCase)
 
 
 CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]
@@ -153,9 +171,9 @@ FEEDS = tuple(
 """The feeds by column: the live design, then the pinned ones."""
 
 
-def design_in(column: int, state: State) -> Design | None:
-    """Return the design of a column; None if nothing is pinned there."""
-    return (state.design, *Compared.of(state).pinned)[column]
+def design_in(column: int, state: State) -> Comparable | None:
+    """Return the design or table of a column; None if nothing is pinned there."""
+    return (state.design, *Compared.of(state).places)[column]
 
 
 def drawing_in(column: int, feed: CompareFeed) -> ComparedDrawing | None:
@@ -166,6 +184,6 @@ def drawing_in(column: int, feed: CompareFeed) -> ComparedDrawing | None:
     return drawing if column == LIVE or drawing.request.design == request.design else None
 
 
-def unit_ratio(design: Design, live: Design) -> float:
+def unit_ratio(design: Comparable, live: Design) -> float:
     """Return one unit of a design in units of the live design."""
     return design.unit_mm / live.unit_mm

@@ -144,6 +144,8 @@ class SavedDesigns:
             elif suffix == ".csv":
                 columns = parse_table(name, data, 1.0).columns
                 fields = {*columns, ",".join(sorted(columns)), suffix}
+            elif suffix in openers:
+                fields = {suffix}
             else:
                 raise InputError(f"{name} is no design, study or session; these are JSON files")
             opener = next((openers[each] for each in openers if each in fields), open_design_file)
@@ -272,9 +274,10 @@ class DesignsPanel:
         self.status = gui.add_html("")
         services.add_upload(
             "Open a file …",
-            "A design, a study or a session (JSON), what was measured of a machine or the poses of "
-            "a path (CSV), from this computer; or drop it anywhere on the page.",
-            "application/json,text/csv",
+            "A design, a table on six legs, a study or a session (JSON), what was measured of a "
+            "machine or the poses of a path (CSV), a table of LinuxCNC (HAL), from this computer; "
+            "or drop it anywhere on the page.",
+            "application/json,text/csv,.hal",
             saved.take,
             takes_drops=True,
         )

@@ -25,8 +25,8 @@ from explorer.mechanism import rgb
 from explorer.mechanism.rgb import OUTLINE, Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Updates
-from explorer.reproduce.six_legs import TWIN
 from explorer.singularity.colours import proximity_colour
+from explorer.six_legged.files import TWIN
 
 # Sizes in scene units.
 PLATE_THICKNESS, BASE_RADIUS = 0.22, 0.75

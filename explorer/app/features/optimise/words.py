@@ -15,7 +15,7 @@ from explorer.app.state.state import State
 from explorer.app.state.view import View
 from explorer.app.widgets import markup
 from explorer.measures.blocks.block import Look
-from explorer.measures.catalogue import CATALOGUE
+from explorer.measures.catalogue import CATALOGUE, Measurements
 from explorer.measures.measure import CERTAIN
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.number_text import Unit, format_number
@@ -227,7 +227,7 @@ def _comparison_row(problem: problems.Problem, name: str, columns: Sequence[Comp
     measure, after = CATALOGUE[name], columns[-1].measured
     label, hint = measure.label, measure.hint
     pairs: dict[str, tuple[int, int] | None] = {}
-    if after is not None:
+    if isinstance(after, Measurements):
         pairs = {"least_clearance": after.nearest, "demanded_clearance": after.demanded_nearest}
         if name == "demanded_clearance":
             # The unit of the row follows.

@@ -25,7 +25,7 @@ from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.page.widgets.assigning import Updates
 from explorer.page.widgets.palette import Key, shift, with_keys
-from explorer.reproduce.six_legs import TWIN
+from explorer.six_legged.files import TWIN
 
 FORMS: Mapping[DrawnAs, tuple[str, tuple[Key, ...]]] = {
     "schematic": ("Legs and plates as simple bodies.", ()),

@@ -1,0 +1,1 @@
+"""Tables on six legs, as numbers beside the designs: their files, poses, workspace and measures."""
