@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from playwright.sync_api import Locator
+from playwright.sync_api import Browser, Locator
 from tab import Tab
 
 
@@ -12,7 +12,9 @@ def button_of(tab: Tab, words: str) -> Locator:
     return tab.page.get_by_role("button", name=words, exact=True)
 
 
-def test_lesson_is_done_by_hand_left_and_printed(tab: Tab, tmp_path: Path) -> None:
+def test_lesson_is_done_by_hand_left_and_printed(
+    browser: Browser, tab: Tab, tmp_path: Path
+) -> None:
     first = tab.state
     tab.open_dialog("Help")
     # The second step of the second lesson, then back.
@@ -38,7 +40,8 @@ def test_lesson_is_done_by_hand_left_and_printed(tab: Tab, tmp_path: Path) -> No
         button_of(tab, "Handout").nth(1).click()
     download.value.save_as(tmp_path / "handout.html")
     assert download.value.suggested_filename == "The three tetrahedra.html"
-    sheets = tab.page.context.new_page()
+    # No page of the tab, whose requests other tests look at.
+    sheets = browser.new_page()
     sheets.goto((tmp_path / "handout.html").as_uri())
     assert sheets.locator("img").evaluate_all("all => all.every((each) => each.naturalWidth > 0)")
     sheets.pdf(path=tmp_path / "handout.pdf", prefer_css_page_size=True)
