@@ -11,9 +11,31 @@ from dataclasses import dataclass
 
 from explorer.measures.loads import loads
 from explorer.measures.measure import NEEDS, Case, Measure, Place
-from explorer.measures.workspace import coordinates, workspace_measures
-from explorer.mechanism.design import Design
+from explorer.measures.workspace import workspace_measures
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.computed_once import computed_once
+
+
+def coordinates() -> Iterable[Measure]:
+    """Yield the yaw of home and the design variables."""
+    yield Measure(
+        "yaw",
+        "yaw of home",
+        "Yaw of the orientation that the home pose has",
+        lambda case: case.design.home_pose.yaw_pitch_roll[0],
+        unit="°",
+        places=("compare", "optimise"),
+    )
+    for index, name in enumerate(VARIABLES):
+        yield Measure(
+            name,
+            name,
+            f"Design variable, in the frame of the {'base' if index < 2 else 'platform'}",
+            lambda case, index=index: case.design.variables[index],
+            power=1,
+            places=("compare",),
+        )
+
 
 CATALOGUE: Mapping[str, Measure] = {
     measure.name: measure
@@ -29,7 +51,7 @@ def measures_in(place: Place) -> dict[str, Measure]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measured:
+class MeasureValues:
     """The values of measures for one design, in design units, or for a table, in millimetres.
 
     Attributes:
@@ -52,7 +74,7 @@ class Measured:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measurements(Measured):
+class Measurements(MeasureValues):
     """The values of measures for one design.
 
     Attributes:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from explorer.legs.clearance import LegClearances, leg_clearances
-from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.configuration import Conditioning, Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals
 from explorer.mechanism.folds import assembly_modes
@@ -33,24 +33,17 @@ from explorer.statics.accuracy import CORNERS
 from explorer.workspace.limits.valid_poses import Collision, Violation, violations
 
 
-class Indices:
+class Indices(Conditioning):
     """Indices of poses, which follow from J; those of conditioning are 0 in a singular pose.
 
     Attributes:
-        singular_values: Those of J with lengths over the reach, descending, shape (..., 6).
         twists: J⁻¹, whose columns are twists (v; ω), shape (..., 6, 6); infinite in singular poses.
         joint_arms: Vectors from the point of the twists to the points at which the forces of the
             joints act on the platform, shape (..., 6, 3).
     """
 
-    singular_values: cached_property[FloatArray]
     twists: cached_property[FloatArray]
     joint_arms: cached_property[FloatArray]
-
-    @property
-    def inverse_condition(self) -> FloatArray:
-        """The inverse condition number 1/κ of J with lengths over the reach, shape (...)."""
-        return self.singular_values[..., -1] / self.singular_values[..., 0]
 
     @property
     def smallest_singular_value(self) -> FloatArray:

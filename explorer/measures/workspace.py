@@ -15,7 +15,6 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.measure import Case, Measure, Sense
-from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.margins import MARGIN_KINDS, margins
 from explorer.numerics.arrays import FloatArray
 
@@ -373,26 +372,6 @@ def _orientations() -> Iterable[Measure]:
         places=("compare", "optimise", "studies", "report"),
         for_tables=True,
     )
-
-
-def coordinates() -> Iterable[Measure]:
-    """Yield the yaw of home and the design variables."""
-    yield Measure(
-        "yaw",
-        "yaw of home",
-        "Yaw of the orientation that the home pose has",
-        lambda case: case.design.home_pose.yaw_pitch_roll[0],
-        unit="°",
-        places=("compare", "optimise"),
-    )
-    for index, name in enumerate(VARIABLES):
-        yield Length(
-            name,
-            name,
-            f"Design variable, in the frame of the {'base' if index < 2 else 'platform'}",
-            lambda case, index=index: case.design.variables[index],
-            places=("compare",),
-        )
 
 
 def workspace_measures() -> Iterable[Measure]:

@@ -27,7 +27,22 @@ WITHOUT_TOOL = (
 """The properties of a `Configuration` that do not depend on its tool."""
 
 
-class Configuration:
+class Conditioning:
+    """The conditioning of J in poses.
+
+    Attributes:
+        singular_values: Those of J with lengths over the reach, descending, shape (..., 6).
+    """
+
+    singular_values: cached_property[FloatArray]
+
+    @property
+    def inverse_condition(self) -> FloatArray:
+        """The inverse condition number 1/κ of J with lengths over the reach, shape (...)."""
+        return self.singular_values[..., -1] / self.singular_values[..., 0]
+
+
+class Configuration(Conditioning):
     """A design in one pose or in a batch of poses, with a tool point; all are attributes too.
 
     Args:
@@ -170,11 +185,6 @@ class Configuration:
         """
         homogeneous = self.jacobian / np.repeat([1.0, self.design.reach], 3)
         return np.asarray(np.linalg.svd(homogeneous, compute_uv=False), dtype=np.float64)
-
-    @property
-    def inverse_condition(self) -> FloatArray:
-        """The inverse condition number 1/κ of J with lengths over the reach, shape (...)."""
-        return self.singular_values[..., -1] / self.singular_values[..., 0]
 
     @cached_property
     def variables(self) -> FloatArray:

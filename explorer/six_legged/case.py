@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.measures.catalogue import CATALOGUE, Measured, values_of
+from explorer.measures.catalogue import CATALOGUE, MeasureValues, values_of
 from explorer.mechanism.pose import rotation_array
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -147,8 +147,10 @@ class TableCase:
         return np.asarray(held.all(axis=-1))
 
     @cached_property
-    def measured(self) -> Measured:
+    def measurements(self) -> MeasureValues:
         """The values of `TABLE_MEASURES`, in millimetres, degrees and plain numbers."""
         # The measures of tables ask only for what both cases have.
         values, infinite = values_of(cast("Case", cast("Any", self)), TABLE_MEASURES)
-        return Measured(values=values, empty_because=self.volume.empty_because, infinite=infinite)
+        return MeasureValues(
+            values=values, empty_because=self.volume.empty_because, infinite=infinite
+        )

@@ -33,7 +33,7 @@ FIELD = "base_mm"
 """A field that no other kind of file has."""
 
 INCH = 25.4
-EQUAL = "; made equal to "
+EQUAL = "made equal to "
 """What a table's source says before the design to which it was made equal."""
 
 # Height of the assumed home over the distance of the farthest base point from the origin, and the
@@ -146,13 +146,14 @@ def made_equal(table: SixLegged, design: Design) -> SixLegged:
     shortest = np.maximum(0.0, table.home_lengths - 0.5 * stroke)
     swings = [angle for angle in msgspec.structs.astuple(design.limits.swing) if angle is not None]
     cones = f"cones of {min(swings):g}°" if swings else "no cones"
-    words = f"{design.name}: strokes of {stroke:.4g} mm about home's lengths, {cones}"
+    own = table.source.partition(EQUAL)[0].removesuffix("; ")
+    words = f"{EQUAL}{design.name}: strokes of {stroke:.4g} mm about home's lengths, {cones}"
     return msgspec.structs.replace(
         table,
         shortest_mm=shortest,
         longest_mm=shortest + stroke,
         cones_deg=(min(swings),) * 6 if swings else None,
-        source=f"{table.source.partition(EQUAL)[0]}{EQUAL}{words}",
+        source=f"{own}; {words}" if own else words,
     )
 
 

@@ -137,7 +137,7 @@ def test_squares_of_the_ground_have_the_size_of_their_label(
     design = msgspec.structs.replace(design, unit_mm=unit_mm)
     state = open_state(design, view=View(lengths=lengths))
     placed = Placed(Frame(state))
-    size = f"{placed.square_shown:.6e}"
+    size = f"{placed.square_in_unit:.6e}"
     assert float(size[0]) in (1.0, 2.0, 5.0)
     assert size[1:8] == ".000000"
     # Along the base's axis lie as many squares as a2 is millimetres, or design units, away.
@@ -145,7 +145,7 @@ def test_squares_of_the_ground_have_the_size_of_their_label(
     shown = (unit_mm if lengths == "mm" else 1.0) * float(
         np.linalg.norm(placed.frame.snapshot.points.a2)
     )
-    assert drawn / placed.square == pytest.approx(shown / placed.square_shown)
+    assert drawn / placed.square == pytest.approx(shown / placed.square_in_unit)
     assert 0.5 <= placed.square <= 2.0
 
 

@@ -311,7 +311,7 @@ def test_scale_bar_has_the_length_that_it_names_at_any_distance(
     placed, unit = Placed(Frame(wide.state)), wide.state.unit
     wide.look_from("isometric")
     scale = wide.page.evaluate(SCALE)
-    assert scale["text"] == f"1 square = {placed.square_shown:,.6g} {unit.name}"
+    assert scale["text"] == f"1 square = {placed.square_in_unit:,.6g} {unit.name}"
     wide.look_from("front")
     scale = wide.page.evaluate(SCALE)
     a1, a2 = (in_scene(wide, placed.points[name]) for name in ("a1", "a2"))

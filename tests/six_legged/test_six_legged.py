@@ -246,7 +246,7 @@ def test_measures_of_a_table_grow_with_it() -> None:
             home=TableHome((0.0, 0.0, 2.0 * OCTAHEDRAL.home.position_mm[2])),
         ),
     )
-    values = [TableCase(table).measured for table in (small, large)]
+    values = [TableCase(table).measurements for table in (small, large)]
     assert tuple(values[0].values) == TABLE_MEASURES
     for name in TABLE_MEASURES:
         one, two = (each[name] for each in values)
@@ -279,6 +279,12 @@ def test_made_equal_has_the_stroke_and_the_cones_of_the_design() -> None:
         is_free = np.array(equal.shortest_mm) > 0.0
         np.testing.assert_allclose(middle[is_free], table.home_lengths[is_free])
     assert made_equal(CIRCLES, OPTIMAL).cones_deg is None
+    # Its source tells what was made equal last, also where it told nothing before.
+    unknown = msgspec.structs.replace(CIRCLES, source="")
+    told = made_equal(unknown, design).source
+    assert told.startswith("made equal to buildable: strokes of ")
+    assert made_equal(made_equal(unknown, OPTIMAL), design).source == told
+    assert made_equal(made_equal(CIRCLES, OPTIMAL), design).source == f"{CIRCLES.source}; {told}"
 
 
 def test_tables_measure_the_same_things_as_designs() -> None:

@@ -55,7 +55,7 @@ def framing(
     the picture's width over its height.
     """
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    towards = np.array(DIRECTIONS[view]) if isinstance(view, str) else view
+    towards = _direction(view)
     forward, right, up = _axes(-towards)
     half = math.tan(0.5 * FIELD_OF_VIEW)
     depth = _depth(points, centre, forward)
@@ -67,6 +67,11 @@ def framing(
         distance = max(distance, 0.5 * (high - low) / slope)
         target = target + 0.5 * (low + high) * axis
     return target - 1.05 * distance * forward, target
+
+
+def _direction(view: ViewName | FloatArray) -> FloatArray:
+    """Return the direction (3,) from the target to the eye of a view."""
+    return np.array(DIRECTIONS[view]) if isinstance(view, str) else view
 
 
 def places_in_picture(
@@ -182,7 +187,7 @@ class Cameras:
         """
         placement = self._placements.get(client.client_id)
         if placement is not None and placement.has(client):
-            away = np.array(DIRECTIONS[view]) if isinstance(view := placement.view, str) else view
+            away = _direction(placement.view)
         else:
             away = np.asarray(client.camera.position) - np.asarray(client.camera.look_at)
         return triple(away / max(float(np.linalg.norm(away)), 1e-300))

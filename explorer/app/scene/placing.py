@@ -75,14 +75,14 @@ class Placed:
         return scene_scale(self.frame.state)
 
     @cached_property
-    def square_shown(self) -> float:
+    def square_in_unit(self) -> float:
         """Side of the squares of the ground in the unit of the page, about one scene unit."""
         return round_step(self.frame.state.unit.convert(1.0 / self.scale))
 
     @property
     def square(self) -> float:
         """Side of the squares of the ground in scene units."""
-        return self.scale * self.square_shown / self.frame.state.unit.convert(1.0)
+        return self.scale * self.square_in_unit / self.frame.state.unit.convert(1.0)
 
     @cached_property
     def points(self) -> dict[str, FloatArray]:

@@ -12,17 +12,15 @@ from explorer.cli import values
 from explorer.cli.options import JsonOptions
 from explorer.cli.output import attributes, figure, table
 from explorer.cli.streams import write_error
-from explorer.measures.catalogue import CATALOGUE, Measured, measure_design
+from explorer.measures.catalogue import CATALOGUE, MeasureValues, measure_design
 from explorer.measures.measure import Case
 from explorer.mechanism.design_file import PRESETS
-from explorer.numerics.number_text import Unit
 from explorer.six_legged.case import OF_TABLES, TABLE_MEASURES, TableCase
 
 if TYPE_CHECKING:
     from explorer.reproduce.claim import Result
 
 WIDTH = 96
-MILLIMETRES = Unit("mm")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,13 +51,15 @@ class ReproduceCommand(JsonOptions):
         if self.equal:
             tables = [made_equal(table, PRESETS["paper-optimal"]) for table in tables]
         warm()
-        chosen = None if not self.beside else self.claim
-        results = list(
-            measure_claims(self.claim or chosen, lambda title: write_error(f"measuring: {title}"))
-        )
+        names = self.claim or (() if self.beside else None)
+        results = list(measure_claims(names, lambda title: write_error(f"measuring: {title}")))
         cases = [TableCase(table) for table in tables]
         beside = [
-            {"name": case.table.name, "source": case.table.source, **_values_json(case.measured)}
+            {
+                "name": case.table.name,
+                "source": case.table.source,
+                **_values_json(case.measurements),
+            }
             for case in cases
         ]
         # One table is an object, several are a list.
@@ -70,7 +70,7 @@ class ReproduceCommand(JsonOptions):
         )
 
 
-def _values_json(measured: Measured) -> dict[str, object]:
+def _values_json(measured: MeasureValues) -> dict[str, object]:
     """Return values in millimetres and degrees, by names that end in their units."""
     units = {3: "_mm3", 1: "_mm"}
     return {
@@ -84,11 +84,14 @@ def _beside_lines(cases: Sequence[TableCase]) -> Iterator[str]:
     """Yield a table of measures: a column for the paper's optimum, and one for each table."""
     design = PRESETS["paper-optimal"]
     own = measure_design(Case(design), TABLE_MEASURES)
-    columns = [(own, design.millimetres), *((case.measured, MILLIMETRES) for case in cases)]
+    columns = [
+        (own, design.millimetres),
+        *((case.measurements, case.table.millimetres) for case in cases),
+    ]
     rows: list[tuple[str, ...]] = [("", "", design.name, *(case.table.name for case in cases))]
     for name in TABLE_MEASURES:
         measure = CATALOGUE[name]
-        unit = measure.unit_in(MILLIMETRES).name
+        unit = measure.unit_in(design.millimetres).name
         factors = [measure.unit_in(lengths).factor for _, lengths in columns]
         found = [each.value(name) for each, _ in columns]
         cells = [

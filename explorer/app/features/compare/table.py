@@ -20,7 +20,7 @@ from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
 from explorer.measures.blocks.block import Look
-from explorer.measures.catalogue import Measure, Measured, measures_in
+from explorer.measures.catalogue import Measure, MeasureValues, measures_in
 from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics import number_text
@@ -55,7 +55,7 @@ class ComparedDesign:
 
     number: int
     design: Comparable
-    measured: Measured | None
+    measured: MeasureValues | None
     unit: Unit
     is_current: bool = True
     problem: str | None = None
@@ -117,7 +117,7 @@ def notes(state: State, columns: tuple[ComparedDesign, ...]) -> list[str]:
             causes = ", ".join(map(escape, column.measured.empty_because))
             remarks.append(f"{who} has an empty workspace; emptied by: {causes}.")
         if isinstance(column.design, SixLegged) and column.design.source:
-            remarks.append(f"{who}: {escape(column.design.source.removeprefix('; '))}.")
+            remarks.append(f"{who}: {escape(column.design.source)}.")
     if any(isinstance(column.design, SixLegged) for column in columns):
         remarks.append(OF_TABLES)
     if state.view.lengths != "mm" and len({column.design.unit_mm for column in columns}) > 1:
@@ -258,7 +258,8 @@ def _exact_text(measure: Measure, column: ComparedDesign) -> str:
         return value_text(measure, value, value)
     if measure.power == 0:
         return column.unit_of(measure).text(value, 12)
-    size, units = column.design.reach**3, [number_text.UNITS, column.design.millimetres]
+    size, units = column.design.reach**3, (column.design.millimetres,)
     # The unit of a table is the millimetre.
-    units = units[isinstance(column.design, SixLegged) :]
+    if isinstance(column.design, Design):
+        units = (number_text.UNITS, *units)
     return " = ".join(unit.to_power(measure.power, size).text(value, 12) for unit in units)

@@ -21,7 +21,7 @@ from explorer.app.state.geometry import without_name
 from explorer.app.state.parts import FeaturePart
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
-from explorer.measures.catalogue import Measured, measure_design, measures_in
+from explorer.measures.catalogue import MeasureValues, measure_design, measures_in
 from explorer.measures.measure import Case
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Point, offset_of
@@ -105,7 +105,7 @@ class ComparedDrawing:
     """
 
     request: ComparedRequest
-    measurements: Measured | None
+    measurements: MeasureValues | None
     shell: Shell | None
     outline: FloatArray
     problem: str | None = None
@@ -125,8 +125,8 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
         base, platform = np.moveaxis(design.home_poses.ends, 1, 0)
         rings = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in (base, platform)]
         lines = np.concatenate([design.home_poses.ends, *rings])
-        return ComparedDrawing(request, _kept_table(design).measured, None, lines)
-    measurements: Measured | None = None
+        return ComparedDrawing(request, _kept_table(design).measurements, None, lines)
+    measurements: MeasureValues | None = None
     shell: Shell | None = None
     problem: str | None = None
     try:

@@ -231,7 +231,8 @@ class Ground(ScenePart):
         view, lowest = placed.frame.state.view, ground_of(placed)
         yield from show(view.grid, self._grid, self._scale)
         # Of the sides of the squares, which the page draws.
-        yield self._scale, "text", f"{placed.square_shown:.6g} {placed.frame.state.unit.name}"
+        square = f"{placed.square_in_unit:.6g} {placed.frame.state.unit.name}"
+        yield self._scale, "text", square
         yield self._grid, "cell_size", placed.square
         yield self._grid, "section_size", 5.0 * placed.square
         yield self._grid, "position", (0.0, 0.0, lowest - GRID_BELOW)
