@@ -17,7 +17,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.six_legged.table import SixLegged, TablePoses
 from explorer.workspace.extremes import extremes_of
 from explorer.workspace.least_clearance import DEFAULT_NODES, nodes_of
-from explorer.workspace.limits.constraints import Constraint, angle_between
+from explorer.workspace.limits.constraints import Constraint
 from explorer.workspace.limits.region import Region, region_of
 from explorer.workspace.orientations.share import share_of
 from explorer.workspace.slices.volume import Volume, find_emptying_limits, region_volume
@@ -136,14 +136,12 @@ class TableCase:
         poses, table = TablePoses(self.table, position, rotation), self.table
         held = (poses.lengths >= table.shortest_mm) & (poses.lengths <= table.longest_mm)
         if table.cones_deg is not None:
-            home = table.home_poses
-            turns = poses.rotation @ home.rotation.T
-            for k, axis in enumerate(home.directions):
-                angle, leg = math.radians(table.cones_deg[k]), poses.directions[..., k, :]
-                held[..., k] &= angle_between(leg, axis) <= angle
-                # As the platform sees its leg.
-                own = np.einsum("...ji,...j->...i", turns, leg)
-                held[..., k] &= angle_between(own, axis) <= angle
+            home, legs = table.home_poses, poses.directions
+            within = np.cos(np.radians(table.cones_deg))
+            # As the platform sees its legs.
+            own = legs @ (poses.rotation @ home.rotation.T)
+            for seen in (legs, own):
+                held &= (seen * home.directions).sum(axis=-1) >= within
         return np.asarray(held.all(axis=-1))
 
     @cached_property
