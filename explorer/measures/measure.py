@@ -265,7 +265,8 @@ class Measure:
         needs: What the measure needs of a case, out of `NEEDS`.
         reason: Why a workspace that is not empty lacks the value; "" if nothing is known.
         places: Where it is listed.
-        for_tables: Whether a table on six legs has it too, see `explorer.six_legged.case`.
+        for_tables: Whether a table on six legs has it too, see `explorer.six_legged.case`, and
+            whether its value is exact there or an upper bound, "at most"; "" if it has none.
     """
 
     name: str
@@ -282,7 +283,7 @@ class Measure:
     needs: tuple[str, ...] = ()
     reason: Callable[[Case], str] = lambda _: ""
     places: tuple[Place, ...] = get_args(Place)
-    for_tables: bool = False
+    for_tables: Literal["", "exact", "at most"] = ""
 
     @property
     def heading(self) -> str:

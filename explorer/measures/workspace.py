@@ -93,7 +93,7 @@ def _sizes() -> Iterable[Measure]:
         lambda case: case.volume.volume,
         title="exact volume",
         power=3,
-        for_tables=True,
+        for_tables="at most",
     )
     yield More(
         "volume_per_leg",
@@ -101,7 +101,7 @@ def _sizes() -> Iterable[Measure]:
         "Volume of the workspace for the size of the design",
         lambda case: case.volume.volume / case.longest_leg**3,
         places=("compare",),
-        for_tables=True,
+        for_tables="at most",
     )
     yield Measure(
         "node_count",
@@ -144,7 +144,7 @@ def _sizes() -> Iterable[Measure]:
         lambda case: case.longest_leg,
         sense="less",
         places=("compare", "optimise", "studies"),
-        for_tables=True,
+        for_tables="exact",
     )
     for axis, name in enumerate("xyz"):
         yield Length(
@@ -154,7 +154,7 @@ def _sizes() -> Iterable[Measure]:
             lambda case, axis=axis: float(case.extent[axis]),
             cost="high",
             places=("compare",),
-            for_tables=True,
+            for_tables="at most",
         )
     for axis, name in enumerate("xyz"):
         yield _length_at_nodes(
@@ -279,7 +279,7 @@ def _index(name: str, label: str, hint: str, mean: str = "") -> Iterable[Measure
         f"In the home pose, the {hint}",
         lambda case: float(getattr(case.home_indices, name)),
         places=("compare", "studies"),
-        for_tables=True,
+        for_tables="exact",
     )
     yield AtNodes(
         f"worst_{name}",
@@ -288,7 +288,7 @@ def _index(name: str, label: str, hint: str, mean: str = "") -> Iterable[Measure
         over_nodes(np.min),
         cost="high",
         places=("studies",) if mean else ("compare", "studies"),
-        for_tables=True,
+        for_tables="exact",
     )
     if mean:
         yield AtNodes(
@@ -297,7 +297,7 @@ def _index(name: str, label: str, hint: str, mean: str = "") -> Iterable[Measure
             f"Mean over the nodes of the workspace of the {hint}",
             over_nodes(np.mean),
             cost="high",
-            for_tables=True,
+            for_tables="exact",
         )
 
 
@@ -305,8 +305,9 @@ def _indices() -> Iterable[Measure]:
     yield from _index(
         "inverse_condition",
         "inverse condition",
-        "inverse condition number 1/κ of the Jacobian, with lengths divided by the reach; 0 is "
-        "singular, 1 the best (Gosselin and Angeles 1991)",
+        "inverse condition number 1/κ of the Jacobian, with lengths divided by the reach (of a "
+        "table on six legs, by the largest distance of two base points); 0 is singular, 1 the best "
+        "(Gosselin and Angeles 1991)",
         "global conditioning index",
     )
     yield from _index(
@@ -348,7 +349,7 @@ def _indices() -> Iterable[Measure]:
             lambda case, name=name: float(getattr(case.home_indices, name)),
             sense="less",
             places=("compare", "studies"),
-            for_tables=True,
+            for_tables="exact",
         )
 
 
@@ -360,7 +361,7 @@ def _orientations() -> Iterable[Measure]:
         lambda case: case.home_share,
         unit="share",
         places=("compare", "optimise", "studies", "report"),
-        for_tables=True,
+        for_tables="at most",
     )
     yield More(
         "home_tilt",
@@ -370,7 +371,7 @@ def _orientations() -> Iterable[Measure]:
         lambda case: case.home_tilt,
         unit="°",
         places=("compare", "optimise", "studies", "report"),
-        for_tables=True,
+        for_tables="at most",
     )
 
 

@@ -135,7 +135,7 @@ def one_of(name: str, value: object, allowed: Sequence[str]) -> str:
     return str(value)
 
 
-def title(name: str, value: object) -> str:
+def title(name: str, value: object, longest: int = LONGEST_NAME) -> str:
     """Return the value as the name of a design or a study, in the form of `tidy_name`.
 
     It is one printable line, and not of blanks and points alone: it becomes a part of the names of
@@ -143,9 +143,9 @@ def title(name: str, value: object) -> str:
     """
     instance(name, value, str)
     tidy = tidy_name(str(value))
-    if not tidy.strip(" .") or len(tidy) > LONGEST_NAME or not tidy.isprintable():
+    if not tidy.strip(" .") or len(tidy) > longest or not tidy.isprintable():
         raise DesignError(
-            f"{name} must be one printable line of 1 to {LONGEST_NAME} characters, and not of "
+            f"{name} must be one printable line of 1 to {longest} characters, and not of "
             f"blanks and points alone; got {_short_repr(value)}",
             name,
         )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,24 +20,24 @@ from explorer.workspace.extremes import extremes_of
 from explorer.workspace.least_clearance import DEFAULT_NODES, nodes_of
 from explorer.workspace.limits.constraints import Constraint
 from explorer.workspace.limits.region import Region, region_of
-from explorer.workspace.orientations.share import share_of
+from explorer.workspace.orientations.share import even_angles, share_of
 from explorer.workspace.slices.volume import Volume, find_emptying_limits, region_volume
-
-if TYPE_CHECKING:
-    from explorer.measures.measure import Case
 
 TABLE_MEASURES = tuple(name for name, measure in CATALOGUE.items() if measure.for_tables)
 """The measures that a table has."""
 
 OF_TABLES = (
-    "All positions of a table on six legs within its strokes and cones count, on both sides of "
-    "singular poses and of the base: the sign of det J is no assembly mode of a table, while the "
-    "signs of the margins are one of a design, which keeps it."
+    "≤ is an upper bound: of a table on six legs all positions and orientations within its strokes "
+    "and cones count, also those behind singular poses and below its base. The sign of det J is no "
+    "assembly mode of a table, while a design keeps its mode, by the signs of its margins."
 )
 """What the numbers of tables mean beside those of designs, in words."""
 
 # Azimuths of the greatest tilt, steps of tilt in which a limit is looked for, and halvings of one.
 AZIMUTHS, TILT_STEPS, HALVINGS = 72, 720, 40
+
+Holds = Callable[[FloatArray, FloatArray], BoolArray]
+"""Function that tells which poses (..., 3), (..., 3, 3) are within limits, shape (...)."""
 
 
 @dataclass
@@ -54,10 +55,15 @@ class TableCase:
     nodes: int = DEFAULT_NODES
 
     @cached_property
+    def at_rotation(self) -> FloatArray:
+        """The orientation of the workspace, shape (3, 3)."""
+        home = self.table.home_pose.rotation
+        return home if self.rotation is None else rotation_array(self.rotation)
+
+    @cached_property
     def limits(self) -> tuple[Constraint, ...]:
         """The lengths and cones as solids of positions of the platform's origin."""
-        home = self.table.home_pose.rotation
-        return self.table.limits(home if self.rotation is None else rotation_array(self.rotation))
+        return self.table.limits(self.at_rotation)
 
     @cached_property
     def region(self) -> Region:
@@ -72,11 +78,16 @@ class TableCase:
         return Volume(volume, error, gradient, because)
 
     @cached_property
+    def box(self) -> tuple[FloatArray, FloatArray] | None:
+        """The lows and highs of the workspace, each (3,), exact; None if it is empty."""
+        points = extremes_of(self.limits, self.region, self.table.reach, np.zeros((0, 3)))
+        is_empty = not len(points) or self.volume.volume <= 0.0
+        return None if is_empty else (points.min(axis=0), points.max(axis=0))
+
+    @property
     def extent(self) -> FloatArray:
         """The exact extents of the workspace on the axes, shape (3,); NaN if it is empty."""
-        points = extremes_of(self.limits, self.region, self.table.reach, np.zeros((0, 3)))
-        empty = not len(points) or self.volume.volume <= 0.0
-        return np.full(3, math.nan) if empty else np.ptp(points, axis=0)
+        return np.full(3, math.nan) if self.box is None else self.box[1] - self.box[0]
 
     @property
     def longest_leg(self) -> float:
@@ -85,8 +96,8 @@ class TableCase:
 
     @cached_property
     def node_positions(self) -> FloatArray:
-        """The nodes of a grid in the workspace, shape (n, 3)."""
-        return nodes_of(self.region, self.nodes)
+        """The nodes of a grid in the box of the workspace, shape (n, 3)."""
+        return nodes_of(self.region, self.nodes, self.box)
 
     @cached_property
     def home_indices(self) -> TablePoses:
@@ -96,10 +107,7 @@ class TableCase:
     @cached_property
     def node_indices(self) -> TablePoses:
         """The table at the nodes, with its indices."""
-        home = self.table.home_pose.rotation
-        return TablePoses(
-            self.table, self.node_positions, home if self.rotation is None else self.rotation
-        )
+        return TablePoses(self.table, self.node_positions, self.at_rotation)
 
     @cached_property
     def home_share(self) -> float:
@@ -108,28 +116,9 @@ class TableCase:
 
     @cached_property
     def home_tilt(self) -> float:
-        """The greatest tilt at home in every azimuth, in degrees, without a gap from tilt zero.
-
-        It is the least over 72 azimuths, at home's torsion; 0 if tilt zero is not within limits. A
-        violation within less than a quarter of a degree can be missed.
-        """
-        position = self.table.home.position_mm
-        torsion = tilt_torsion_of(self.table.home_pose.rotation).torsion
-
-        def are_held(azimuths: ArrayLike, tilts: ArrayLike) -> BoolArray:
-            angles = np.stack(np.broadcast_arrays(azimuths, tilts, torsion), axis=-1)
-            return self.holds(position, rotation_from_tilt_torsion(angles))
-
-        azimuths = np.arange(AZIMUTHS) * (360.0 / AZIMUTHS)
-        tilts = np.linspace(0.0, 180.0, TILT_STEPS + 1)
-        held = are_held(azimuths[:, None], tilts)
-        ends = np.where(held.all(axis=1), TILT_STEPS, held.argmin(axis=1) - 1)
-        low, high = tilts[np.maximum(ends, 0)], tilts[np.minimum(ends + 1, TILT_STEPS)]
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            is_held = are_held(azimuths, middle)
-            low, high = np.where(is_held, middle, low), np.where(is_held, high, middle)
-        return float(low.min()) if ends.min() >= 0 else 0.0
+        """The greatest tilt at home in every azimuth, at home's torsion, see `greatest_tilts`."""
+        home = self.table.home_pose
+        return float(greatest_tilts(self.holds, [home.position], home.rotation)[0])
 
     def holds(self, position: ArrayLike, rotation: ArrayLike) -> BoolArray:
         """Return whether poses (..., 3), (..., 3, 3) keep lengths and cones, shape (...)."""
@@ -148,7 +137,38 @@ class TableCase:
     def measurements(self) -> MeasureValues:
         """The values of `TABLE_MEASURES`, in millimetres, degrees and plain numbers."""
         # The measures of tables ask only for what both cases have.
-        values, infinite = values_of(cast("Case", cast("Any", self)), TABLE_MEASURES)
+        values, infinite = values_of(cast("Any", self), TABLE_MEASURES)
         return MeasureValues(
             values=values, empty_because=self.volume.empty_because, infinite=infinite
         )
+
+
+def greatest_tilts(
+    holds: Holds,
+    positions: ArrayLike,
+    rotation: FloatArray,
+    azimuths: int = AZIMUTHS,
+    steps: int = TILT_STEPS,
+) -> FloatArray:
+    """Return the greatest tilts in every azimuth at n positions, in degrees, shape (n,).
+
+    All tilts below are within limits too; it is 0 where tilt zero is not. The torsion is that of an
+    orientation (3, 3). It is the least over the azimuths, and a violation within less than one of
+    the steps, into which 180° are divided, can be missed.
+    """
+    torsion, at = tilt_torsion_of(rotation).torsion, np.asarray(positions)[:, None]
+
+    def are_within(position: FloatArray, azimuth: FloatArray, tilt: FloatArray) -> BoolArray:
+        angles = np.stack(np.broadcast_arrays(azimuth, tilt, torsion), axis=-1)
+        return holds(position, rotation_from_tilt_torsion(angles))
+
+    azimuth = even_angles("azimuths", azimuths)
+    tilts = np.asarray(np.linspace(0.0, 180.0, steps + 1), dtype=np.float64)
+    within = are_within(at[..., None, :], azimuth[:, None], tilts)
+    ends = np.where(within.all(axis=-1), steps, within.argmin(axis=-1) - 1)
+    low, high = tilts[np.maximum(ends, 0)], tilts[np.minimum(ends + 1, steps)]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        is_within = are_within(at, azimuth, middle)
+        low, high = np.where(is_within, middle, low), np.where(is_within, high, middle)
+    return np.where((ends >= 0).all(axis=-1), low.min(axis=-1), 0.0)

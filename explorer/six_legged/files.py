@@ -1,13 +1,15 @@
 """Tables by name, in JSON files and in settings of LinuxCNC, and the twin of a design.
 
-LinuxCNC's `genhexkins` is set by lines such as `setp genhexkins.base.0.x -22.95`. They have no
-unit, home or strokes, so that these are assumed, and the table's source tells how. A line of the
-INI file beside them, `LINEAR_UNITS = inch`, makes the numbers inches.
+LinuxCNC's `genhexkins` is set by lines such as `setp genhexkins.base.0.x -22.95`, or
+`genhexkins.base.0.x = -22.95`. They have no unit, home or strokes, so that these are assumed, and
+the table's source tells how. A line of the INI file beside them, `LINEAR_UNITS = inch`, makes the
+numbers inches.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +18,7 @@ from types import MappingProxyType
 import msgspec
 import numpy as np
 
-from explorer.errors import InputError
+from explorer.errors import InputError, StorageError
 from explorer.files.json_text import decode_strictly, field_names, located_errors
 from explorer.files.packaged import packaged_files
 from explorer.files.writing import read_at_most
@@ -24,7 +26,14 @@ from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.checks import number
-from explorer.six_legged.table import SixLegged, TableHome, table_of
+from explorer.six_legged.table import (
+    LONGEST,
+    LONGEST_SOURCE,
+    MOST_CONE,
+    SixLegged,
+    TableHome,
+    table_of,
+)
 
 TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("a3", "b4"))
 """The six legs of the 6-4 twin, base point and platform point (the paper's Figure 1a)."""
@@ -33,14 +42,17 @@ FIELD = "base_mm"
 """A field that no other kind of file has."""
 
 INCH = 25.4
-EQUAL = "made equal to "
-"""What a table's source says before the design to which it was made equal."""
 
-# Height of the assumed home over the distance of the farthest base point from the origin, and the
-# lengths of the legs over those at home.
-HEIGHT, STROKE = 0.75, (0.5, 1.5)
-SETTING = re.compile(r"^\s*setp\s+genhexkins\.(base|platform)\.(\w+)\.(\w+)\s+(\S+)", re.MULTILINE)
-IN_INCHES = re.compile(r"^[#\s]*LINEAR_UNITS\s*=\s*in", re.MULTILINE | re.IGNORECASE)
+# Least stroke to which a table is made equal, in millimetres.
+LEAST_STROKE = 1e-3
+
+# Number of the settings. Height of the assumed home over the distance of the farthest base point
+# from the origin, and the lengths of the legs over those at home.
+COORDINATES, HEIGHT, STROKE = 36, 0.75, (0.5, 1.5)
+SETTING = re.compile(r"(?:setp\s+)?genhexkins\.(base|platform)\.(\w+)\.(\w+)(?:\s*=\s*|\s+)(\S+)")
+IS_SETTING = re.compile(r"\bgenhexkins\.(base|platform)\.")
+LINEAR_UNITS = re.compile(r"LINEAR_UNITS\s*=\s*(\w+)", re.IGNORECASE)
+UNITS = {"mm": 1.0, "metric": 1.0, "in": INCH, "inch": INCH, "imperial": INCH}
 
 
 def decode_table(data: bytes, source: str) -> SixLegged:
@@ -53,21 +65,20 @@ def decode_table(data: bytes, source: str) -> SixLegged:
     if FIELD in field_names(data):
         return decode_strictly(data, SixLegged, source)
     with located_errors(data, SixLegged, source) as text:
-        settings = SETTING.findall(text)
+        settings, unit = _hal_settings(text)
         if not settings:
             raise InputError(
                 f"the file holds no table on six legs: give JSON with {FIELD}, platform_mm, "
                 "shortest_mm, longest_mm and home, or lines of a HAL file such as "
                 "setp genhexkins.base.0.x -22.95"
             )
-        unit = INCH if IN_INCHES.search(text) else 1.0
         # What is not set has LinuxCNC's own number.
         default = TABLES["LinuxCNC default"]
         points = {
             "base": np.array(default.base_mm) * unit / INCH,
             "platform": np.array(default.platform_mm) * unit / INCH,
         }
-        for part, leg, axis, value in settings:
+        for (part, leg, axis), value in settings.items():
             name = f"genhexkins.{part}.{leg}.{axis}"
             if leg not in tuple("012345") or axis not in tuple("xyz"):
                 raise InputError(f"{name} is unknown; legs are 0 to 5, axes x, y and z")
@@ -75,11 +86,42 @@ def decode_table(data: bytes, source: str) -> SixLegged:
             with contextlib.suppress(ValueError):
                 amount = float(value)
             points[part][int(leg), "xyz".index(axis)] = unit * number(name, amount)
-        words = "inches" if unit == INCH else "mm"
-        return _by_home(points["base"], points["platform"], f"LinuxCNC's settings, in {words}")
+        words = f"LinuxCNC's settings, in {'inches' if unit == INCH else 'mm'}"
+        if len(settings) < COORDINATES:
+            words += f", {COORDINATES - len(settings)} of {COORDINATES} of them its defaults"
+        return _with_assumed_home(points["base"], points["platform"], words)
 
 
-def _by_home(base: FloatArray, platform: FloatArray, source: str) -> SixLegged:
+def _hal_settings(text: str) -> tuple[dict[tuple[str, str, str], str], float]:
+    """Return the settings in lines of a HAL file by part, leg and axis, and their millimetres."""
+    settings: dict[tuple[str, str, str], str] = {}
+    units: set[str] = set()
+    # LinuxCNC reads no units from a HAL file, so that their line may be a comment there.
+    commented: set[str] = set()
+    for line in text.splitlines():
+        words, _, comment = (part.strip() for part in line.partition("#"))
+        if found := SETTING.fullmatch(words):
+            part, leg, axis, value = found.groups()
+            settings[part, leg, axis] = value
+        elif IS_SETTING.search(words):
+            raise InputError(
+                f"the line {words[:60]!r} cannot be read; a setting is like setp "
+                "genhexkins.base.0.x -22.95"
+            )
+        elif found := LINEAR_UNITS.match(words):
+            units.add(found[1].lower())
+        elif found := LINEAR_UNITS.fullmatch(comment):
+            commented.add(found[1].lower())
+    named = units or commented or {"mm"}
+    sizes = {UNITS.get(name, math.nan) for name in named}
+    if len(sizes) > 1 or not sizes <= set(UNITS.values()):
+        raise InputError(
+            f"LINEAR_UNITS is {' and '.join(sorted(named))}; give one of {', '.join(UNITS)}"
+        )
+    return settings, sizes.pop()
+
+
+def _with_assumed_home(base: FloatArray, platform: FloatArray, source: str) -> SixLegged:
     """Return a table with an assumed home and strokes; its source tells them."""
     height = float(base[:, 2].mean()) + HEIGHT * float(np.linalg.norm(base, axis=1).max())
     legs = platform + [0.0, 0.0, height] - base
@@ -100,17 +142,15 @@ def load_table(name_or_file: str | Path) -> SixLegged:
     """Return a packaged table by name, or the table in a JSON or HAL file.
 
     Raises:
-        InputError: There is no such table or file, or the file holds none.
-        StorageError: The file cannot be read.
+        InputError: There is no such table, or the file cannot be read or holds none.
     """
     if str(name_or_file) in TABLES:
         return TABLES[str(name_or_file)]
-    path = Path(name_or_file)
-    if not path.exists():
-        raise InputError(
-            f"no table and no file named {str(name_or_file)!r}; the tables are {', '.join(TABLES)}"
-        )
-    return decode_table(read_at_most(path), str(path))
+    try:
+        data = read_at_most(Path(name_or_file))
+    except StorageError as error:
+        raise InputError(f"{error}; the packaged tables are {', '.join(TABLES)}") from None
+    return decode_table(data, str(name_or_file))
 
 
 def six_four_twin(design: Design, a2x: float, longest: float | None = None) -> SixLegged:
@@ -137,23 +177,25 @@ def six_four_twin(design: Design, a2x: float, longest: float | None = None) -> S
 def made_equal(table: SixLegged, design: Design) -> SixLegged:
     """Return a table with the stroke and the cones of a design, so that both can be compared.
 
-    Each leg has the longest stroke of the design's l1, d2, d4 and l4, half of it to either side of
-    its length at home, or from zero on if that is shorter. Each cone is the least of the design's
-    swings; there are none if the design has none. The source of the table tells what was made.
+    Each leg has the longest stroke of the design's l1, d2, d4 and l4, which is a micrometre at
+    least, half of it to either side of its length at home, or from zero on if that is shorter. Each
+    cone is the least of the design's swings; there are none if the design has none, or a leg no
+    length at home. The source of the table tells what was made.
     """
     ranges = [design.length_range(name) for name in LENGTHS]
-    stroke = design.unit_mm * max(high - low for low, high in ranges)
+    stroke = max(LEAST_STROKE, design.unit_mm * max(high - low for low, high in ranges))
     shortest = np.maximum(0.0, table.home_lengths - 0.5 * stroke)
+    longest = np.minimum(shortest + stroke, LONGEST)
     swings = [angle for angle in msgspec.structs.astuple(design.limits.swing) if angle is not None]
-    cones = f"cones of {min(swings):g}°" if swings else "no cones"
-    own = table.source.partition(EQUAL)[0].removesuffix("; ")
-    words = f"{EQUAL}{design.name}: strokes of {stroke:.4g} mm about home's lengths, {cones}"
+    cone = min(*swings, MOST_CONE) if swings and table.home_lengths.all() else None
+    cones = "no cones" if cone is None else f"cones of {cone:g}°"
+    words = f"made equal to {design.name}: strokes of {stroke:.4g} mm about home's lengths, {cones}"
     return msgspec.structs.replace(
         table,
         shortest_mm=shortest,
-        longest_mm=shortest + stroke,
-        cones_deg=(min(swings),) * 6 if swings else None,
-        source=f"{own}; {words}" if own else words,
+        longest_mm=longest,
+        cones_deg=None if cone is None else (cone,) * 6,
+        source=f"{table.source[: LONGEST_SOURCE // 2]}; {words}" if table.source else words,
     )
 
 

@@ -25,12 +25,22 @@ from explorer.mechanism.built_machine import BuiltPose
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple, rotation_array
 from explorer.numerics import checks
-from explorer.numerics.arrays import FloatArray, finite_array, lengths_of, position_array, triple
+from explorer.numerics.arrays import (
+    FloatArray,
+    batch_shape,
+    finite_array,
+    lengths_of,
+    position_array,
+    triple,
+)
 from explorer.numerics.number_text import Unit
 from explorer.workspace.limits.constraints import AXES, BallOrCylinder, Cone, Constraint
 
 LONGEST = 100_000.0
 """Largest length of a leg or coordinate of a point of a table, in millimetres."""
+
+# Most characters of a source.
+LONGEST_SOURCE = 1000
 
 MOST_CONE = 179.0
 """Largest half-angle of a cone, in degrees."""
@@ -38,7 +48,7 @@ MOST_CONE = 179.0
 # Steps of Newton's method, the longest of them over the longest leg, and the largest error of
 # lengths that close, over it.
 STEPS, LONGEST_STEP, CLOSED = 60, 0.3, 1e-12
-# |det J| with lengths over the longest leg up to which a pose is singular but for rounding.
+# |det J| with lengths over the size of the base up to which a pose is singular but for rounding.
 SINGULAR = 1e-12
 
 Points = tuple[Triple, Triple, Triple, Triple, Triple, Triple]
@@ -89,6 +99,8 @@ class SixLegged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     def __post_init__(self) -> None:
         _set(self, "name", checks.title("name", self.name))
+        if self.source:
+            _set(self, "source", checks.title("source", self.source, LONGEST_SOURCE))
         for name in ("base_mm", "platform_mm"):
             points = finite_array(name, getattr(self, name), (6, 3), LONGEST)
             _set(self, name, tuple(map(triple, points)))
@@ -103,6 +115,7 @@ class SixLegged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
                     "cones_deg",
                 )
             _set(self, "cones_deg", tuple(cones))
+        checks.instance("home", self.home, TableHome)
         home = Pose(self.home.position_mm, self.home.quaternion)
         _set(self, "home", TableHome(home.position, home.quaternion))
         at_home = zip(self.home_lengths.tolist(), self.shortest_mm, self.longest_mm, strict=True)
@@ -112,11 +125,16 @@ class SixLegged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
                     f"leg {leg} has {length:.6g} mm at home, which must lie within its shortest_mm "
                     f"{low:g} and longest_mm {high:g}: change these, or home"
                 )
+            if self.cones_deg is not None and not length:
+                raise DesignError(
+                    f"leg {leg} has no length at home, so that its cone has no axis: change home, "
+                    "or give null as cones_deg"
+                )
         # Near home, since a table may be singular there alone.
         turns = Rotation.from_rotvec([(0.0, 0.0, 0.0), *product((-0.3, 0.4), repeat=3)])
-        positions = np.array(home.position) + 0.1 * self.reach * turns.as_rotvec()
+        positions = np.array(home.position) + 0.1 * self.base_size * turns.as_rotvec()
         poses = TablePoses(self, positions, turns.as_matrix() @ home.rotation)
-        if (poses.manipulability < SINGULAR).all():
+        if not self.base_size or (poses.manipulability < SINGULAR).all():
             raise DesignError(
                 "every pose is singular: the six legs never fix the platform; move some of the "
                 "points of base_mm or platform_mm"
@@ -124,8 +142,17 @@ class SixLegged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     @property
     def reach(self) -> float:
-        """The longest leg, in millimetres, over which lengths in J are taken."""
+        """The longest leg, in millimetres."""
         return max(self.longest_mm)
+
+    @property
+    def base_size(self) -> float:
+        """The largest distance of two base points, as |a1 a3| is for a design, in millimetres.
+
+        Lengths in J are taken over it: no stroke changes it.
+        """
+        points = np.array(self.base_mm)
+        return float(lengths_of(points[:, None] - points).max())
 
     @property
     def unit_mm(self) -> float:
@@ -190,21 +217,21 @@ class SixLegged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         position: ArrayLike | None = None,
         rotation: ArrayLike | None = None,
     ) -> BuiltPose:
-        """Return poses with given lengths (6,), by Newton's method from home or from other starts.
+        """Return poses with lengths (..., 6), by Newton's method from home or from other starts.
 
         There may be up to 40 poses with the same lengths, of which one is found from each start:
         from home the one that a machine reaches, as long as the lengths are near to home's. Starts
         have the shapes (..., 3), in millimetres, and (..., 3, 3). Where the steps do not converge,
-        `closes` is False.
+        `closes` is False; a singular start may never be left.
 
         Raises:
-            InputError: The lengths are not six finite numbers, or a start is no pose.
+            InputError: Lengths are not finite, or a start is no pose, or they do not broadcast.
         """
         home = self.home_pose
         lengths = finite_array("lengths_mm", lengths_mm, (6,), LONGEST)
         p = position_array("position", home.position if position is None else position)
         r = rotation_array(home.rotation if rotation is None else rotation)
-        scale = np.repeat([1.0, 1.0 / self.reach], 3)
+        scale = np.repeat([1.0, 1.0 / self.base_size], 3)
         for _ in range(STEPS):
             poses = TablePoses(self, p, r)
             j, off = poses.homogeneous, (lengths - poses.lengths)[..., None]
@@ -233,13 +260,14 @@ class TablePoses(Indices):
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: A position is not finite, or a rotation is not one.
+        InputError: A position is not finite, a rotation is not one, or they do not broadcast.
     """
 
     def __init__(self, table: SixLegged, position: ArrayLike, rotation: ArrayLike) -> None:
         self.table = table
         self.position = position_array("position", position)
         self.rotation = rotation_array(rotation)
+        batch_shape((self.position, 1), (self.rotation, 2))
 
     @cached_property
     def joint_arms(self) -> FloatArray:
@@ -275,8 +303,8 @@ class TablePoses(Indices):
 
     @property
     def homogeneous(self) -> FloatArray:
-        """J with lengths over the longest leg, shape (..., 6, 6)."""
-        return self.jacobian / np.repeat([1.0, self.table.reach], 3)
+        """J with lengths over the size of the base, shape (..., 6, 6)."""
+        return self.jacobian / np.repeat([1.0, self.table.base_size], 3)
 
     @cached_property
     def singular_values(self) -> FloatArray:

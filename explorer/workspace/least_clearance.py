@@ -268,7 +268,6 @@ def node_measures(
     Raises:
         InputError: Too few or too many nodes.
     """
-    whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
     positions = nodes_of(workspace.region, nodes)
     if not len(positions):
         none = np.full(3, np.nan)
@@ -288,11 +287,21 @@ def node_measures(
     )
 
 
-def nodes_of(region: Region, nodes: int = DEFAULT_NODES) -> FloatArray:
-    """Return the nodes in a region of a grid of so many on each axis of its box, shape (n, 3)."""
-    if region.box is None:
+def nodes_of(
+    region: Region, nodes: int = DEFAULT_NODES, box: tuple[FloatArray, FloatArray] | None = None
+) -> FloatArray:
+    """Return the nodes in a region of a grid of so many on each axis of a box, shape (n, 3).
+
+    The box is (lows, highs), that of the region if None.
+
+    Raises:
+        InputError: Too few or too many nodes.
+    """
+    whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
+    within_box = region.box if box is None else box
+    if within_box is None:
         return np.zeros((0, 3))
-    lows, highs = region.box
+    lows, highs = within_box
     step, within = (highs - lows) / nodes, np.zeros((nodes,) * 3, dtype=np.bool_)
     mark_nodes(nodes**3, *region.rows, lows + 0.5 * step, step, 0.0, within)
     return lows + (np.argwhere(within) + 0.5) * step

@@ -23,6 +23,7 @@ BENCHMARKS: Mapping[str, str] = {
     "forward": "the forward kinematics and the folds: a batch on one core, and one call",
     "controller": "the kernel in C, beside Newton on the six lengths of a hexapod",
     "workspace": "exact volume, solid, and the region that holds a load",
+    "six_legged": "all numbers of a table on six legs, and its volume beside random positions",
     "slider": "from the arrival of a slider's event to the last message of the scene",
     "interference": "overlap of tetrahedra, clearances of the legs, moves, accessible workspace",
     "nearest": "nearest singular pose of all three incidences",

@@ -13,7 +13,7 @@ from command_line import CommandLine
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, InputError, from_folds, to_folds
+from explorer import PRESETS, InputError, from_folds, to_folds, workspace_volume
 from explorer.files.packaged import read_page
 from explorer.legs.clearance import write_closest
 from explorer.mechanism.configuration import Configuration
@@ -255,13 +255,17 @@ def test_command_measures_tables_beside_the_optimum(capsys: pytest.CaptureFixtur
     forces = float(case.home_indices.force_per_newton)
     assert found["beside"]["force_per_newton"] == pytest.approx(forces, rel=1e-12)
     assert found["beside"]["longest_leg_mm"] == 380.0
+    volume = workspace_volume(PRESETS["paper-optimal"]).volume
+    assert found["design"]["volume_mm3"] == pytest.approx(1e3 * volume, rel=1e-12)
+    assert "give --beside TABLE_OR_FILE" in cli.refusal("reproduce", "--equal")
     names = ("octahedral", "LinuxCNC default")
     several = cli.answer("reproduce", "--beside", *names, "--equal")["beside"]
     assert [each["name"] for each in several] == [*names]
     text = cli.text("reproduce", "--beside", "octahedral")
-    assert re.search(r"global transmission index +0\.16550\d +0\.90940\d", text)
-    assert "the sign of det J is no assembly mode of a table" in " ".join(text.split())
-    assert "the tables are Dietmaier" in cli.refusal("reproduce", "--beside", "no-such-table")
+    assert re.search(r"global transmission index +0\.16550\d +0\.90812\d", text)
+    assert re.search(r"volume +mm\S+ +7\.05304e\+06  <= 8\.92169e\+06", text)
+    assert "The sign of det J is no assembly mode of a table" in " ".join(text.split())
+    assert "packaged tables are Dietmaier" in cli.refusal("reproduce", "--beside", "no-such-table")
 
 
 def test_unknown_claim_is_refused() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import mujoco  # pyright: ignore[reportMissingTypeStubs]
@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from explorer import PRESETS, InputError, Workspace, workspace_volume
 from explorer.measures.catalogue import CATALOGUE, values_of
 from explorer.measures.measure import Case
-from explorer.mechanism.design import Swing
+from explorer.mechanism.design import Design, Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.six_legged.case import TABLE_MEASURES, TableCase
 from explorer.six_legged.files import (
@@ -34,11 +34,12 @@ from explorer.workspace.slices.volume import region_volume
 
 engine: Any = mujoco
 OPTIMAL = PRESETS["paper-optimal"]
+Struct = TypeVar("Struct", bound=msgspec.Struct)
 CIRCLES, OCTAHEDRAL = TABLES["two circles"], TABLES["octahedral"]
 
 
-def changed(table: SixLegged, **fields: Any) -> SixLegged:
-    return msgspec.structs.replace(table, **fields)
+def changed(of: Struct, **fields: Any) -> Struct:
+    return msgspec.structs.replace(of, **fields)
 
 
 @pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
@@ -254,7 +255,7 @@ def test_measures_of_a_table_grow_with_it() -> None:
         assert two == pytest.approx(one * 2.0 ** CATALOGUE[name].power, rel=1e-6), name
 
 
-def test_greatest_tilt_and_share_of_a_twin_are_those_of_its_poses() -> None:
+def test_greatest_tilt_and_share_at_home_are_those_of_its_poses() -> None:
     case = TableCase(OCTAHEDRAL)
     turns = Rotation.random(40_000, rng=np.random.default_rng(5)).as_matrix()
     share = case.holds(OCTAHEDRAL.home.position_mm, turns).mean()
@@ -279,12 +280,47 @@ def test_made_equal_has_the_stroke_and_the_cones_of_the_design() -> None:
         is_free = np.array(equal.shortest_mm) > 0.0
         np.testing.assert_allclose(middle[is_free], table.home_lengths[is_free])
     assert made_equal(CIRCLES, OPTIMAL).cones_deg is None
-    # Its source tells what was made equal last, also where it told nothing before.
-    unknown = msgspec.structs.replace(CIRCLES, source="")
-    told = made_equal(unknown, design).source
+    # Its source tells what was made equal, also where it told nothing before.
+    told = made_equal(changed(CIRCLES, source=""), design).source
     assert told.startswith("made equal to buildable: strokes of ")
-    assert made_equal(made_equal(unknown, OPTIMAL), design).source == told
-    assert made_equal(made_equal(CIRCLES, OPTIMAL), design).source == f"{CIRCLES.source}; {told}"
+    assert made_equal(CIRCLES, design).source == f"{CIRCLES.source}; {told}"
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        OPTIMAL.with_limits(swing=Swing(a1=180.0)),
+        changed(OPTIMAL, unit_mm=1e4),
+        OPTIMAL.with_limits(**dict.fromkeys(("l1", "d2", "d4", "l4"), (5.0, 5.0))),
+    ],
+    ids=["swing of half a turn", "unit of ten metres", "no stroke"],
+)
+def test_tables_are_made_equal_to_every_design(design: Design) -> None:
+    for table in (*TABLES.values(), changed(CIRCLES, source="long " * 180)):
+        equal = made_equal(table, design)
+        assert equal.source.endswith(("no cones", "cones of 179°"))
+        assert made_equal(equal, design).longest_mm == equal.longest_mm
+    # A leg without length at home has no axis of a cone.
+    tips = np.array(CIRCLES.platform_mm) + CIRCLES.home.position_mm
+    base = np.vstack([tips[:1], CIRCLES.base_mm[1:]])
+    touching = changed(CIRCLES, base_mm=base, shortest_mm=(0.0,) * 6)
+    assert made_equal(touching, OPTIMAL.with_limits(swing=Swing(a1=40.0))).cones_deg is None
+    assert "leg 1 has no length at home" in refusal(
+        lambda: changed(touching, cones_deg=(30.0,) * 6)
+    )
+
+
+def test_narrow_cones_leave_nodes() -> None:
+    case = TableCase(changed(OCTAHEDRAL, cones_deg=(1.0,) * 6))
+    assert len(case.node_positions) > 100
+    assert case.measurements["mean_transmission_index"] == pytest.approx(0.936, abs=2e-3)
+
+
+def test_indices_know_no_stroke() -> None:
+    longer = changed(OCTAHEDRAL, longest_mm=(1e5,) * 6)
+    for name in ("inverse_condition", "manipulability", "transmission_index"):
+        values = [getattr(each.home_poses, name) for each in (longer, OCTAHEDRAL)]
+        assert values[0] == pytest.approx(values[1], rel=1e-12)
 
 
 def test_tables_measure_the_same_things_as_designs() -> None:
@@ -316,7 +352,7 @@ def test_settings_of_linuxcnc_are_read() -> None:
     table = decode_table(HAL.replace("# [TRAJ] ", "").encode(), "machine.hal")
     np.testing.assert_allclose(table.base_mm, default.base_mm, atol=1e-9)
     np.testing.assert_allclose(table.platform_mm, default.platform_mm, atol=1e-9)
-    assert "inches; assumed are a level home at z = " in table.source
+    assert "inches, 33 of 36 of them its defaults; assumed are a level home at z" in table.source
     metric = decode_table(b"setp genhexkins.base.3.z 1.5\nsetp genhexkins.base.4.z 1.5", "m.hal")
     np.testing.assert_allclose(np.array(metric.base_mm)[3:5, 2], 1.5)
     np.testing.assert_allclose(
@@ -327,9 +363,33 @@ def test_settings_of_linuxcnc_are_read() -> None:
         ("setp genhexkins.base.0.x here", "genhexkins.base.0.x must be a number; got 'here'"),
         ("setp genhexkins.base.0.x nan", "genhexkins.base.0.x must be a finite number; got nan"),
         ("setp motion.x 1", "no table on six legs: give JSON with base_mm"),
+        (
+            "setp genhexkins.base.0.x\nsetp genhexkins.base.0.y 1",
+            "'setp genhexkins.base.0.x' cannot",
+        ),
+        ("setp genhexkins.base.0.x 1\nLINEAR_UNITS = cm", "LINEAR_UNITS is cm; give one of mm"),
+        ("LINEAR_UNITS = cm\nLINEAR_UNITS = mm", "LINEAR_UNITS is cm and mm; give one of mm"),
         ("", "empty or truncated"),
     ):
         assert words in refusal(decode_table, text.encode(), "machine.hal")
+
+
+@pytest.mark.parametrize(
+    ("line", "unit"),
+    [
+        ("LINEAR_UNITS = mm", 1.0),
+        ("LINEAR_UNITS = imperial", 25.4),
+        ("# LINEAR_UNITS = Inch", 25.4),
+        ("# LINEAR_UNITS = inch\nLINEAR_UNITS = mm", 1.0),
+        ("# LINEAR_UNITS = inch or mm: choose one", 1.0),
+        ("LINEAR_UNITS = inch  # of the INI file", 25.4),
+    ],
+)
+def test_unit_of_settings_is_that_of_its_line(line: str, unit: float) -> None:
+    text = f"{line}\n  genhexkins.base.0.x = -22.5\nsetp genhexkins.base.0.y\t1.3e1\r\n"
+    table = decode_table(text.encode(), "machine.hal")
+    np.testing.assert_allclose(table.base_mm[0][:2], (-22.5 * unit, 13.0 * unit))
+    assert "34 of 36 of them its defaults" in table.source
 
 
 @pytest.mark.parametrize(
@@ -344,6 +404,7 @@ def test_settings_of_linuxcnc_are_read() -> None:
         ("home", {"position_mm": [0, 0, 250], "quaternion": [0, 0, 0, 0]}, "must not be all zeros"),
         ("platform", [], "platform is unknown, did you mean platform_mm?"),
         ("name", " ", "name must be one printable line"),
+        ("source", "\x1b[31m", "source must be one printable line"),
     ],
 )
 def test_table_that_nobody_builds_is_refused(field: str, value: object, words: str) -> None:
@@ -354,6 +415,13 @@ def test_table_that_nobody_builds_is_refused(field: str, value: object, words: s
 
 
 def test_unknown_table_is_refused_with_the_names_of_all() -> None:
-    assert "the tables are Dietmaier, Griffis and Duffy" in refusal(load_table, "hexapod")
+    for name in ("hexapod", "long" * 100):
+        assert "the packaged tables are Dietmaier, Griffis and Duffy" in refusal(load_table, name)
+    positions, turns = np.zeros((4, 3)), np.tile(np.eye(3), (5, 1, 1))
+    assert "do not broadcast" in refusal(TablePoses, CIRCLES, positions, turns)
+    assert "nodes on an axis must lie within 2" in refusal(
+        lambda: TableCase(CIRCLES, nodes=0).node_positions
+    )
+    assert "home must be of type TableHome" in refusal(lambda: changed(CIRCLES, home=(0.0,) * 3))
     with pytest.raises(InputError):
         CIRCLES.forward([1.0, 2.0])

@@ -54,6 +54,7 @@ from explorer.mechanism.folds import pose_of_folds
 from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.page.browser.headless import headless_browser
+from explorer.six_legged.files import TABLES
 from explorer.sweep.results import load_results
 from explorer.sweep.run import run_study
 from explorer.sweep.study import STUDIES, Sampling
@@ -228,12 +229,14 @@ SCENES = {
     "machine": Scene(
         actions=(open_design(PRESS), Set("view", View(handle=False))), panels=True, tab="Machine"
     ),
-    # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1.
+    # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1 and a
+    # table on six legs.
     "compare": Scene(
         actions=(
             bare(),
             pin(DESIGN),
             pin(PRESETS["paper-initial"]),
+            pin(TABLES["octahedral"]),
             set_variable("a3x", 17.0),
             Set("compared.look", CompareView(overlay=True)),
         ),

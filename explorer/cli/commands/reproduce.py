@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,15 +13,22 @@ from explorer.cli import values
 from explorer.cli.options import JsonOptions
 from explorer.cli.output import attributes, figure, table
 from explorer.cli.streams import write_error
+from explorer.errors import InputError
 from explorer.measures.catalogue import CATALOGUE, MeasureValues, measure_design
 from explorer.measures.measure import Case
+from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.six_legged.case import OF_TABLES, TABLE_MEASURES, TableCase
+from explorer.six_legged.table import SixLegged
 
 if TYPE_CHECKING:
     from explorer.reproduce.claim import Result
 
 WIDTH = 96
+OPTIMUM = PRESETS["paper-optimal"]
+
+Measured = Sequence[tuple[Design | SixLegged, MeasureValues]]
+"""Designs and tables with the values of their measures."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +44,7 @@ class ReproduceCommand(JsonOptions):
 
     beside: Annotated[tuple[str, ...], values.texts("TABLE_OR_FILE …"), values.OPTIONAL] = ()
     """Tables on six legs, by name or in a file (JSON, or LinuxCNC's HAL with genhexkins), to
-    measure beside the paper's optimum; then only claims that are named are measured too."""
+    measure beside the paper's optimum; claims are then measured only if --claim names them."""
 
     equal: values.Flag = False
     """Give these tables the longest stroke of the optimum's legs, and its cones."""
@@ -47,64 +55,62 @@ class ReproduceCommand(JsonOptions):
         from explorer.reproduce.claims import measure_claims
         from explorer.six_legged.files import load_table, made_equal
 
+        if self.equal and not self.beside:
+            raise InputError("--equal is for the tables of --beside: give --beside TABLE_OR_FILE")
         tables = [load_table(name) for name in self.beside]
         if self.equal:
-            tables = [made_equal(table, PRESETS["paper-optimal"]) for table in tables]
+            tables = [made_equal(table, OPTIMUM) for table in tables]
         warm()
         names = self.claim or (() if self.beside else None)
         results = list(measure_claims(names, lambda title: write_error(f"measuring: {title}")))
-        cases = [TableCase(table) for table in tables]
-        beside = [
-            {
-                "name": case.table.name,
-                "source": case.table.source,
-                **_values_json(case.measurements),
-            }
-            for case in cases
-        ]
-        # One table is an object, several are a list.
-        answer = {"beside": beside if len(beside) > 1 else beside[0]} if beside else {}
-        self.write(
-            lambda: {"claims": [*map(_claim_json, results)], **answer},
-            [*_lines(results), *(_beside_lines(cases) if cases else ())],
-        )
+        answer: dict[str, object] = {}
+        lines = [*_lines(results)]
+        if tables:
+            measured: list[tuple[Design | SixLegged, MeasureValues]] = [
+                (OPTIMUM, measure_design(Case(OPTIMUM), TABLE_MEASURES)),
+                *((table, TableCase(table).measurements) for table in tables),
+            ]
+            design, *beside = itertools.starmap(_values_json, measured)
+            # One table is an object, several are a list.
+            answer = {"design": design, "beside": beside if len(beside) > 1 else beside[0]}
+            lines += _beside_lines(measured)
+        self.write(lambda: {"claims": [*map(_claim_json, results)], **answer}, lines)
 
 
-def _values_json(measured: MeasureValues) -> dict[str, object]:
+def _values_json(of: Design | SixLegged, measured: MeasureValues) -> dict[str, object]:
     """Return values in millimetres and degrees, by names that end in their units."""
     units = {3: "_mm3", 1: "_mm"}
-    return {
+    texts = "name source" if isinstance(of, SixLegged) else "name"
+    numbers: dict[str, object] = {
         f"{name}{units.get(measure.power, '_deg' if measure.unit == '°' else '')}": value
+        and value * of.unit_mm**measure.power
         for name, value in measured.values.items()
         for measure in (CATALOGUE[name],)
     }
+    return attributes(of, texts) | numbers | attributes(measured, "empty_because infinite")
 
 
-def _beside_lines(cases: Sequence[TableCase]) -> Iterator[str]:
+def _beside_lines(columns: Measured) -> Iterator[str]:
     """Yield a table of measures: a column for the paper's optimum, and one for each table."""
-    design = PRESETS["paper-optimal"]
-    own = measure_design(Case(design), TABLE_MEASURES)
-    columns = [
-        (own, design.millimetres),
-        *((case.measurements, case.table.millimetres) for case in cases),
-    ]
-    rows: list[tuple[str, ...]] = [("", "", design.name, *(case.table.name for case in cases))]
+    rows: list[tuple[str, ...]] = [("", "", *(of.name for of, _ in columns))]
     for name in TABLE_MEASURES:
         measure = CATALOGUE[name]
-        unit = measure.unit_in(design.millimetres).name
-        factors = [measure.unit_in(lengths).factor for _, lengths in columns]
-        found = [each.value(name) for each, _ in columns]
-        cells = [
-            "none" if value is None else figure(value * factor)
-            for value, factor in zip(found, factors, strict=True)
-        ]
-        rows.append((measure.label, unit, *cells))
+        row = [measure.label, measure.unit_in(OPTIMUM.millimetres).name]
+        for of, measured in columns:
+            value, is_table = measured.value(name), isinstance(of, SixLegged)
+            bound = "<= " if is_table and measure.for_tables == "at most" else ""
+            factor = measure.unit_in(of.millimetres).factor
+            row.append("none" if value is None else bound + figure(value * factor))
+        rows.append(tuple(row))
     yield table(rows, "<<" + ">" * len(columns))
     yield ""
-    for case in cases:
-        text = f"{case.table.name}: {case.table.source}" if case.table.source else case.table.name
-        yield fill(text, WIDTH, break_on_hyphens=False)
-    yield fill(OF_TABLES, WIDTH)
+    for of, measured in columns:
+        if isinstance(of, SixLegged) and of.source:
+            yield fill(f"{of.name}: {of.source}", WIDTH, break_on_hyphens=False)
+        if measured.empty_because:
+            causes = ", ".join(measured.empty_because)
+            yield fill(f"{of.name} has an empty workspace; emptied by: {causes}", WIDTH)
+    yield fill(OF_TABLES.replace("≤", "<="), WIDTH)
 
 
 def _claim_json(result: Result) -> dict[str, object]:

@@ -26,11 +26,12 @@ from explorer.app.widgets.markup import box
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.page.widgets.assigning import Update
-from explorer.six_legged.files import FIELD, TABLES, decode_table, made_equal
+from explorer.six_legged.files import FIELD, TABLES, decode_table
 from explorer.six_legged.table import SixLegged
 
 # Largest number of designs that have a button of their own: the presets, then the last saved.
 MOST_BUTTONS = 12
+DIVIDER = '<span class="ex-divider"></span>'
 
 
 def _pin_words(_: State, design: Comparable) -> str:
@@ -47,7 +48,7 @@ def pin(state: State, design: Comparable) -> State:
     compared, slot = Compared.of(state), Compared.of(state).slot_of(design)
     if slot is not None:
         raise InputError(
-            f"{design.name} is pinned already, as {SLOTS[slot]}; change it, or pin another design"
+            f"{design.name} is pinned already, as {SLOTS[slot]}; change it, or pin another one"
         )
     if None not in compared.places:
         places = ", ".join(SLOTS)
@@ -69,14 +70,6 @@ def unpin(state: State, slot: int) -> State:
     return with_value(cleared, f"compared.tables.{slot}", None)
 
 
-@action("Give pinned tables the strokes and cones of {design}")
-def make_equal(state: State) -> State:
-    """Give the pinned tables the stroke and the cones of the live design."""
-    tables = Compared.of(state).tables
-    equal = tuple(each and made_equal(each, state.design) for each in tables)
-    return with_value(state, "compared.tables", equal)
-
-
 def open_table(_: Services, data: bytes, name: str) -> tuple[Action, str]:
     """Return the action that pins the table in a file, and what it is; see `Opener`."""
     table = decode_table(data, name)
@@ -88,27 +81,27 @@ LOOKS = {
         f"Compare › {label}",
         does,
         *turn(f"compared.look.{name}", label),
-        lambda state: not Compared.of(state).is_empty,
+        lambda state, among=among: any(getattr(Compared.of(state), among)),
     )
-    for label, name, does in (
+    for label, name, among, does in (
         (
             "Overlay workspaces",
             "overlay",
+            "places",
             "Draw the workspaces at home over one another, in the designs' colours, to true size.",
         ),
         (
             "Outlines",
             "outlines",
+            "places",
             "Outline base, legs and platform of the pinned designs in their home poses.",
         ),
-    )
-} | {
-    "Equal strokes and cones": StateCommand(
-        "Compare › Equal strokes and cones",
-        "Give the pinned tables on six legs the longest stroke of the live design's legs about "
-        "their lengths at home, and its least swing as cones; undo brings theirs back.",
-        lambda _: make_equal(),
-        is_ready=lambda state: any(Compared.of(state).tables),
+        (
+            "Equal strokes and cones",
+            "equal",
+            "tables",
+            "Give the pinned tables the longest stroke of the live design's legs, and its cones.",
+        ),
     )
 }
 
@@ -191,17 +184,16 @@ class ComparePanel:
         if compared.is_empty:
             return box(
                 '<div class="ex-before">Pin this design, then change it: the copy stays beside it. '
-                "Or pin another one, or a table on six legs, to compare this design with it. Up to "
-                "three can be pinned; the workspaces of designs can be drawn over one "
-                "another.</div>",
+                "Or pin another one, or a hexapod: a table on six legs below, or drop the file of "
+                "yours (JSON, or LinuxCNC's HAL) on the page. Up to three can be pinned; the "
+                "workspaces of designs can be drawn over one another.</div>",
                 f'<div class="ex-flow">{pins}</div>',
             )
         remarks = "".join(
             f'<div class="ex-dim ex-after">{note}</div>' for note in notes(state, columns)
         )
         return box(
-            f'<div class="ex-flow ex-before">{pins}<span class="ex-divider"></span>'
-            f"{self._looks.buttons(state)}</div>",
+            f'<div class="ex-flow ex-before">{pins}{DIVIDER}{self._looks.buttons(state)}</div>',
             table(columns),
             remarks,
         )
@@ -229,19 +221,21 @@ def _pin_buttons(state: State, choices: Mapping[str, Comparable]) -> str:
     live = press_button("compare.pin", "", words, hint=hint, class_name=look, is_disabled=is_full)
     if is_full:
         return live
-    others = (
-        press_button(
-            "compare.pin",
-            name,
-            f"+ {escape(name)}",
-            hint=f"Pin {name} beside the live design",
-            label=f"Pin {name}",
-            class_name="ex-chip ex-cut",
-        )
-        for name, design in choices.items()
-        if compared.slot_of(design) is None and without_name(design) != without_name(state.design)
-    )
-    return live + "".join(others)
+    groups = {"": [live], "hexapod ": list[str]()}
+    for name, design in choices.items():
+        kind = "hexapod " if isinstance(design, SixLegged) else ""
+        if compared.slot_of(design) is None and without_name(design) != without_name(state.design):
+            groups[kind].append(
+                press_button(
+                    "compare.pin",
+                    name,
+                    f"+ {escape(name)}",
+                    hint=f"Pin {kind}{name} beside the live design",
+                    label=f"Pin {kind}{name}",
+                    class_name="ex-chip ex-cut",
+                )
+            )
+    return DIVIDER.join("".join(group) for group in groups.values() if group)
 
 
 COMPARE = Feature(

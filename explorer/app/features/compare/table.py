@@ -11,8 +11,8 @@ from explorer.app.features.compare.work import (
     LIVE,
     NAMES,
     Comparable,
-    Compared,
     CompareFeed,
+    design_in,
     drawing_in,
 )
 from explorer.app.scene.shapes import COMPARED
@@ -80,6 +80,10 @@ class ComparedDesign:
         """Whether the design has what a measure needs, such as a load."""
         return self.measured is not None and measure.name in self.measured.values
 
+    def is_bound(self, measure: Measure) -> bool:
+        """Whether a value is an upper bound, as some of a table are."""
+        return isinstance(self.design, SixLegged) and measure.for_tables == "at most"
+
     def value(self, measure: Measure) -> float | None:
         """Return a value in the unit of the comparison; None if it is unknown."""
         value = self.own_value(measure)
@@ -93,8 +97,8 @@ class ComparedDesign:
 def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[ComparedDesign, ...]:
     """Return the columns of the live design and of the pinned ones, given the feed of each."""
     columns: list[ComparedDesign] = []
-    designs = (state.design, *Compared.of(state).places)
-    for number, (design, feed) in enumerate(zip(designs, feeds, strict=True)):
+    for number, feed in enumerate(feeds):
+        design = design_in(number, state)
         if design is not None:
             drawing = drawing_in(number, feed)
             measured = None if drawing is None else drawing.measurements
@@ -117,7 +121,7 @@ def notes(state: State, columns: tuple[ComparedDesign, ...]) -> list[str]:
             causes = ", ".join(map(escape, column.measured.empty_because))
             remarks.append(f"{who} has an empty workspace; emptied by: {causes}.")
         if isinstance(column.design, SixLegged) and column.design.source:
-            remarks.append(f"{who}: {escape(column.design.source)}.")
+            remarks.append(f"{who}: {escape(column.design.source.rstrip('.'))}.")
     if any(isinstance(column.design, SixLegged) for column in columns):
         remarks.append(OF_TABLES)
     if state.view.lengths != "mm" and len({column.design.unit_mm for column in columns}) > 1:
@@ -164,12 +168,16 @@ def _hint_of(measure: Measure) -> str:
 
 
 def table(columns: Sequence[ComparedDesign]) -> str:
-    """Return the table in HTML, a row for each measure; the live design is the first column."""
+    """Return the table in HTML, a row for each measure; the live design is the first column.
+
+    Measures that only the live design can have are left out.
+    """
     head = "".join(_head(column) for column in columns)
     rows = "".join(
         measure_row(measure, columns, look="ex-first" if measure.name in FIRSTS else "")
         for measure in measures_in("compare").values()
-        if not measure.needs or any(column.has(measure) for column in columns)
+        if (not measure.needs or any(column.has(measure) for column in columns))
+        and (measure.for_tables or any(isinstance(each.design, Design) for each in columns[1:]))
     )
     return f'<table class="ex-compare"><tr><td class="ex-head"></td>{head}</tr>{rows}</table>'
 
@@ -218,7 +226,8 @@ def measure_row(
     size = max((abs(value) for value in values if value is not None), default=0.0)
     cells: list[str] = []
     for index, (column, value) in enumerate(zip(columns, values, strict=True)):
-        mark = "ex-number is-best" if index in best else "ex-number"
+        is_best = index in best and not column.is_bound(measure)
+        mark = "ex-number is-best" if is_best else "ex-number"
         cells.append(
             f'<td class="{mark}" title="{_exact_text(measure, column)}">'
             f"{_cell(measure, column, value, size)}</td>"
@@ -246,7 +255,8 @@ def _cell(measure: Measure, column: ComparedDesign, value: float | None, size: f
         return "empty"
     if value is None:
         return "infinite" if measure.name in column.measured.infinite else "–"
-    return value_text(measure, value, size)
+    text = value_text(measure, value, size)
+    return f"≤ {text}" if column.is_bound(measure) else text
 
 
 def _exact_text(measure: Measure, column: ComparedDesign) -> str:

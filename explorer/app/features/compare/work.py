@@ -29,6 +29,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.six_legged.case import TableCase
+from explorer.six_legged.files import made_equal
 from explorer.six_legged.table import SixLegged
 from explorer.workspace.solids.solids import whole_solid
 
@@ -42,10 +43,17 @@ Comparable: TypeAlias = Design | SixLegged
 
 @dataclass(frozen=True)
 class CompareView:
-    """How designs are compared in the scene: by their workspaces over one another, by outlines."""
+    """How designs are compared.
+
+    Attributes:
+        overlay: Whether their workspaces are drawn over one another.
+        outlines: Whether the pinned ones are drawn as lines.
+        equal: Whether tables have the strokes and cones of the live design.
+    """
 
     overlay: bool = False
     outlines: bool = False
+    equal: bool = False
 
 
 @dataclass(frozen=True)
@@ -121,30 +129,40 @@ class ComparedDrawing:
 def draw_compared(request: ComparedRequest) -> ComparedDrawing:
     """Return the measurements of a design, and its workspace if requested."""
     design = request.design
-    if isinstance(design, SixLegged):
-        base, platform = np.moveaxis(design.home_poses.ends, 1, 0)
-        rings = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in (base, platform)]
-        lines = np.concatenate([design.home_poses.ends, *rings])
-        return ComparedDrawing(request, _kept_table(design).measurements, None, lines)
     measurements: MeasureValues | None = None
     shell: Shell | None = None
     problem: str | None = None
     try:
-        case = _kept_case(design)
-        measurements = measure_design(case, measures_in("compare"))
-        if request.drawn:
-            solid = whole_solid(case.workspace, request.tolerance or LIVE_TOLERANCE * design.reach)
-            if not solid.is_empty:
-                shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
+        if isinstance(design, SixLegged):
+            measurements = _kept_table(design).measurements
+        else:
+            case, tolerance = _kept_case(design), request.tolerance
+            measurements = measure_design(case, measures_in("compare"))
+            if request.drawn:
+                solid = whole_solid(case.workspace, tolerance or LIVE_TOLERANCE * design.reach)
+                if not solid.is_empty:
+                    shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
         problem = str(error)
-    lines = outline(evaluate(design, design.home_pose))
+    lines = (
+        _table_lines(design)
+        if isinstance(design, SixLegged)
+        else outline(evaluate(design, design.home_pose))
+    )
     return ComparedDrawing(request, measurements, shell, lines, problem)
+
+
+def _table_lines(table: SixLegged) -> FloatArray:
+    """Return the legs of a table at home, and rings about base and platform, shape (n, 2, 3)."""
+    ends = table.home_poses.ends
+    rings = np.stack([ends, np.roll(ends, -1, axis=0)], axis=2)
+    return np.concatenate([ends, *np.moveaxis(rings, 1, 0)])
 
 
 _kept_case = lru_cache(maxsize=CACHED)(Case)
 """The case of a design, with all that has been computed of it."""
 _kept_table = lru_cache(maxsize=CACHED)(TableCase)
+_equal_table = lru_cache(maxsize=CACHED)(made_equal)
 
 
 CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]
@@ -172,8 +190,11 @@ FEEDS = tuple(
 
 
 def design_in(column: int, state: State) -> Comparable | None:
-    """Return the design or table of a column; None if nothing is pinned there."""
-    return (state.design, *Compared.of(state).places)[column]
+    """Return the design or table of a column as it is measured; None if nothing is there."""
+    compared = Compared.of(state)
+    design = (state.design, *compared.places)[column]
+    is_equal = compared.look.equal and isinstance(design, SixLegged)
+    return _equal_table(design, state.design) if is_equal else design
 
 
 def drawing_in(column: int, feed: CompareFeed) -> ComparedDrawing | None:
