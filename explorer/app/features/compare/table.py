@@ -170,14 +170,15 @@ def _hint_of(measure: Measure) -> str:
 def table(columns: Sequence[ComparedDesign]) -> str:
     """Return the table in HTML, a row for each measure; the live design is the first column.
 
-    Measures that only the live design can have are left out.
+    Beside tables alone, the measures that only designs have are left out.
     """
+    are_tables = len(columns) > 1 and all(isinstance(c.design, SixLegged) for c in columns[1:])
     head = "".join(_head(column) for column in columns)
     rows = "".join(
         measure_row(measure, columns, look="ex-first" if measure.name in FIRSTS else "")
         for measure in measures_in("compare").values()
         if (not measure.needs or any(column.has(measure) for column in columns))
-        and (measure.for_tables or any(isinstance(each.design, Design) for each in columns[1:]))
+        and (measure.for_tables or not are_tables)
     )
     return f'<table class="ex-compare"><tr><td class="ex-head"></td>{head}</tr>{rows}</table>'
 
@@ -226,15 +227,15 @@ def measure_row(
     size = max((abs(value) for value in values if value is not None), default=0.0)
     cells: list[str] = []
     for index, (column, value) in enumerate(zip(columns, values, strict=True)):
-        is_best = index in best and not column.is_bound(measure)
-        mark = "ex-number is-best" if is_best else "ex-number"
+        is_bound = column.is_bound(measure)
+        mark = "ex-number is-best" if index in best and not is_bound else "ex-number"
         cells.append(
             f'<td class="{mark}" title="{_exact_text(measure, column)}">'
             f"{_cell(measure, column, value, size)}</td>"
         )
         if index:
             text = ""
-            if value is not None and first is not None and value != first:
+            if value is not None and first is not None and value != first and not is_bound:
                 text = value_text(measure, value - first, size, signed=True)
             text = f'<span class="ex-{change}">{text}</span>' if change else text
             cells.append(
