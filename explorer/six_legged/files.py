@@ -9,7 +9,6 @@ numbers inches.
 from __future__ import annotations
 
 import contextlib
-import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -95,9 +94,7 @@ def decode_table(data: bytes, source: str) -> SixLegged:
 def _hal_settings(text: str) -> tuple[dict[tuple[str, str, str], str], float]:
     """Return the settings in lines of a HAL file by part, leg and axis, and their millimetres."""
     settings: dict[tuple[str, str, str], str] = {}
-    units: set[str] = set()
-    # LinuxCNC reads no units from a HAL file, so that their line may be a comment there.
-    commented: set[str] = set()
+    names: set[str] = set()
     for line in text.splitlines():
         words, _, comment = (part.strip() for part in line.partition("#"))
         if found := SETTING.fullmatch(words):
@@ -108,17 +105,16 @@ def _hal_settings(text: str) -> tuple[dict[tuple[str, str, str], str], float]:
                 f"the line {words[:60]!r} cannot be read; a setting is like setp "
                 "genhexkins.base.0.x -22.95"
             )
-        elif found := LINEAR_UNITS.match(words):
-            units.add(found[1].lower())
-        elif found := LINEAR_UNITS.fullmatch(comment):
-            commented.add(found[1].lower())
-    named = units or commented or {"mm"}
-    sizes = {UNITS.get(name, math.nan) for name in named}
-    if len(sizes) > 1 or not sizes <= set(UNITS.values()):
+        # No command of a HAL file, so that it may be a comment there.
+        elif found := LINEAR_UNITS.fullmatch(words or comment):
+            names.add(found[1].lower())
+    units = {UNITS.get(name) for name in names} or {1.0}
+    unit = units.pop()
+    if units or unit is None:
         raise InputError(
-            f"LINEAR_UNITS is {' and '.join(sorted(named))}; give one of {', '.join(UNITS)}"
+            f"LINEAR_UNITS is {' and '.join(sorted(names))}; give one of {', '.join(UNITS)}"
         )
-    return settings, sizes.pop()
+    return settings, unit
 
 
 def _with_assumed_home(base: FloatArray, platform: FloatArray, source: str) -> SixLegged:

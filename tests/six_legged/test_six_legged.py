@@ -368,7 +368,7 @@ def test_settings_of_linuxcnc_are_read() -> None:
             "'setp genhexkins.base.0.x' cannot",
         ),
         ("setp genhexkins.base.0.x 1\nLINEAR_UNITS = cm", "LINEAR_UNITS is cm; give one of mm"),
-        ("LINEAR_UNITS = cm\nLINEAR_UNITS = mm", "LINEAR_UNITS is cm and mm; give one of mm"),
+        ("# LINEAR_UNITS = inch\nLINEAR_UNITS = mm", "LINEAR_UNITS is inch and mm; give one"),
         ("", "empty or truncated"),
     ):
         assert words in refusal(decode_table, text.encode(), "machine.hal")
@@ -380,7 +380,6 @@ def test_settings_of_linuxcnc_are_read() -> None:
         ("LINEAR_UNITS = mm", 1.0),
         ("LINEAR_UNITS = imperial", 25.4),
         ("# LINEAR_UNITS = Inch", 25.4),
-        ("# LINEAR_UNITS = inch\nLINEAR_UNITS = mm", 1.0),
         ("# LINEAR_UNITS = inch or mm: choose one", 1.0),
         ("LINEAR_UNITS = inch  # of the INI file", 25.4),
     ],
