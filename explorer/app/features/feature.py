@@ -20,7 +20,7 @@ from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.storage.user_data import Autosaver, UserData
-from explorer.app.widgets.buttons import Buttons, copy_button
+from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chips, StateCommand
 from explorer.app.widgets.downloads import Downloads
 from explorer.app.widgets.markup import dim
@@ -30,12 +30,16 @@ from explorer.jobs.jobs import Jobs
 from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.page.look import call_script, read_script
 from explorer.page.widgets.assigning import Updates
-from explorer.page.widgets.palette import Command, Commands
+from explorer.page.widgets.palette import STEP, Command, Commands
 
 Place = Literal["build", "analyse", "work", "dialog"]
 Side = Literal["left", "middle", "right"]
 Shared = TypeVar("Shared")
-
+COPY_HINT = "Copy the command line of this answer; it reads design.json unless this is a preset."
+# Two sheets.
+COPY_ICON = (
+    '<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M5.5 5.5v-3h8v8h-3m-8-5h8v8h-8z"/></svg>'
+)
 
 Opener = Callable[["Services", bytes, str], tuple[Action, str]]
 """Returns the action that opens a file by its content and name, and a sentence on what it is."""
@@ -161,8 +165,19 @@ class Services:
                 run_script_in(event.client, call_script("sendFile"))
 
     def copy_button(self, answer: str, command_of: Callable[[State], str]) -> str:
-        """Add the button that copies the command of an answer in a state; return it as HTML."""
-        return copy_button(self.buttons, answer, lambda: command_of(self.session.latest_state()))
+        """Add the button that copies the command of an answer in a state; return it as HTML.
+
+        The answer is named from the tab on, such as "Loads › Forces".
+        """
+        words, name = "Copy the command line", f"{answer.rpartition(STEP)[2].lower()}.copy"
+
+        def copy(_: str, client: viser.ClientHandle) -> None:
+            command = command_of(self.session.latest_state())
+            run_script_in(client, read_script("copies", command))
+
+        self.buttons.on(name, copy)
+        self.buttons.offer(f"{answer}{STEP}{words}", COPY_HINT, name)
+        return press_button(name, "", COPY_ICON, hint=COPY_HINT, label=words, class_name="ex-copy")
 
 
 def show(visible: bool, *parts: Any) -> Updates:
@@ -193,21 +208,13 @@ def follow_drags(
 def html_of(feed: AnyFeed, html: Callable[[Any], str], title: str, button: str = "") -> str:
     """Return the drawing of a feed as HTML, pale while it is outdated, or why there is none.
 
-    The title is that of a failure; the label is of the button that repeats a cancelled
-    computation.
+    The title is that of a failure; the button repeats a cancelled computation.
     """
     if feed.problem is not None:
         return problem(feed, title, button)
     if feed.drawing is None:
         return dim(progress(feed).capitalize())
     return f'<div class="{look_of(feed)}">{html(feed.drawing)}</div>'
-
-
-def show_html(handle: viser.GuiHtmlHandle, content: str) -> Updates:
-    """Yield the updates that show HTML in a panel, or hide its place if there is none."""
-    yield handle, "visible", content != ""
-    if content:
-        yield handle, "content", content
 
 
 class Panel(Protocol):

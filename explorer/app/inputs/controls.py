@@ -19,10 +19,11 @@ from explorer.app.inputs.bindings import (
 )
 from explorer.app.inputs.bound import Conditions, Control, Slider
 from explorer.app.inputs.ranges import Intervals, Span, Track
-from explorer.app.session.session import Session
+from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.widgets.under_way import AnyFeed
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
 from explorer.page.widgets.assigning import Update
@@ -239,16 +240,36 @@ class Controls:
         keys: tuple[Key, ...] = (),
     ) -> viser.GuiButtonHandle:
         """Add a button that does an action, the main one filled, and its command."""
-        handle = self._gui.add_button(label, hint=hint, icon=icon, color=MAIN if main else None)
 
-        @handle.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            self._session.do(action(), who=event.client_id)
+        def act(who: Who) -> None:
+            self._session.do(action(), who=who)
 
-        self._commands.offer(
-            handle, lambda client: self._session.do(action(), who=client.client_id), keys=keys
-        )
+        return self.press(label, hint, act, icon=icon, color=MAIN if main else None, keys=keys)
+
+    def press(
+        self,
+        label: str,
+        hint: str,
+        act: Callable[[Who], None],
+        *,
+        icon: viser.IconName | None = None,
+        color: Literal["blue", "gray"] | None = None,
+        keys: tuple[Key, ...] = (),
+    ) -> viser.GuiButtonHandle:
+        """Add a button that calls a function for its client, and its command."""
+        handle = self._gui.add_button(label, hint=hint, icon=icon, color=color)
+        handle.on_click(lambda event: act(event.client_id))
+        self._commands.offer(handle, lambda client: act(client.client_id), keys=keys)
         return handle
+
+    def under_way(self, what: str, feed: AnyFeed) -> None:
+        """Add the buttons that stop and repeat the drawing of a feed, such as "workspace"."""
+        hint, icon = f"End the present computation of the {what}.", viser.Icon.PLAYER_STOP
+        stop = self.press(f"Stop computing the {what}", hint, lambda _: feed.cancel(), icon=icon)
+        hint, icon = f"Compute the {what} again after it was stopped.", viser.Icon.REFRESH
+        retry = self.press(f"Compute the {what}", hint, lambda _: feed.retry(), icon=icon)
+        self.follow(stop, "visible", lambda _: feed.stage is not None)
+        self.follow(retry, "visible", lambda _: feed.is_cancelled)
 
     def _bound(
         self, handle: viser.GuiInputHandle[Any], at: Source[Any], label: str, *, power: int

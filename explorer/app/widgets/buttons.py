@@ -22,7 +22,7 @@ from explorer.files.extras import EXTRAS, install_command, need_of
 from explorer.page.browser.browser_facts import decode_text
 from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.page.look import read_script
-from explorer.page.widgets.palette import STEP, Command, Commands, Key
+from explorer.page.widgets.palette import Command, Commands, Key
 
 MANUAL = "help.open"
 """The name of buttons that open the manual; the value is a page, with "#" and a heading or term."""
@@ -219,21 +219,3 @@ def activity(opens: str, title: str, words: str, share: float | None, buttons: s
     )
     title_button = open_button(opens, content, hint=f"Open the tab {opens}.", class_name="ex-name")
     return f'<span class="ex-running">{title_button}{buttons}</span>'
-
-
-HINT = "Copy the command line of this answer; it reads design.json unless this is a preset."
-# Two sheets.
-ICON = (
-    '<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M5.5 5.5v-3h8v8h-3m-8-5h8v8h-8z"/></svg>'
-)
-
-
-def copy_button(buttons: Buttons, answer: str, command: Callable[[], str]) -> str:
-    """Add the button that copies the command of an answer; return it as HTML.
-
-    The answer is named from the tab on, such as "Loads › Forces".
-    """
-    words, name = "Copy the command line", f"{answer.rsplit(STEP, maxsplit=1)[-1].lower()}.copy"
-    buttons.on(name, lambda _, who: run_script_in(who, read_script("copies", command())))
-    buttons.offer(f"{answer}{STEP}{words}", HINT, name)
-    return press_button(name, "", ICON, hint=HINT, label=words, class_name="ex-copy")

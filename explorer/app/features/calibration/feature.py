@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -25,7 +24,6 @@ from explorer.export.pose_tables import parse_table
 from explorer.files.json_text import decode_text
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import typical_machine
-from explorer.page.widgets.assigning import Update
 
 DROP = "Drop a table of joints and of what was measured there on the page (CSV)."
 NAMES = {"measured": "Measured table", "targets": "Target positions"}
@@ -79,49 +77,49 @@ def machine_html(found: Calibration) -> str:
     return render(calibration_blocks(found))
 
 
-class CalibrationPanel:
+class CalibrationPanel(Controls):
     """How well lengths and turns are known, what the table tells of the machine, and its file."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._services = services.gui, services
-        self._feed, self._controls = services.get(CALIBRATION_FEED), Controls(services)
-        with self._controls.folder("Calibration", is_open=False):
+        super().__init__(services)
+        self._feed, self._downloads = services.get(CALIBRATION_FEED), services.downloads
+        with self.folder("Calibration", is_open=False):
             for label, field, step, of in (
                 ("σ of lengths (mm)", "sigma", 0.001, "lengths"),
                 ("σ of turns (°)", "sigma_turn", 0.001, "turns of the platform"),
             ):
                 hint = f"Standard deviation of measured {of}, where the table states none."
-                self._controls.number(label, hint, f"calibrated.{field}", least=1e-6, step=step)
+                self.number(label, hint, f"calibrated.{field}", least=1e-6, step=step)
             hint = "Download the machine, for --machine of the explorer's commands."
-            self._download = gui.add_button("Download machine", hint=hint, color=None)
-            self._download.on_click(lambda event: self._send(event.client_id))
-            services.commands.offer(self._download, lambda client: self._send(client.client_id))
-            self._forget = self._controls.button(
+            download = self.press("Download machine", hint, self._send)
+            forget = self.button(
                 "Forget the table",
                 "Forget what was measured; undo brings it back.",
                 lambda: Set("calibrated.measured", "", NAMES["measured"], "forgotten"),
             )
-            self._result = gui.add_html("")
+            self.markup(self._result)
+        self.follow(forget, "visible", lambda frame: bool(Calibrated.of(frame.state).measured))
+        self.follow(download, "visible", lambda _: self._gained is not None)
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that tell the machine of a frame."""
-        yield from self._controls.updates(frame)
-        content, has_table = box(dim(DROP)), bool(Calibrated.of(frame.state).measured)
-        yield self._forget, "visible", has_table
-        if has_table:
-            told = html_of(self._feed, machine_html, "No machine")
-            assumed = "; ".join(typical_machine(frame.state.design)[1])
-            note = dim(f"Assumed, since the design states none: {assumed}.")
-            content = f"{told}{box(note) if assumed else ''}"
-        yield self._result, "content", content
+    def _result(self, frame: Frame) -> str:
+        if not Calibrated.of(frame.state).measured:
+            return box(dim(DROP))
+        told = html_of(self._feed, machine_html, "No machine")
+        assumed = "; ".join(typical_machine(frame.state.design)[1])
+        note = dim(f"Assumed, since the design states none: {assumed}.")
+        return f"{told}{box(note) if assumed else ''}"
+
+    @property
+    def _gained(self) -> Calibration | None:
+        """The calibration, if it tells more of the machine than was known."""
         found = self._feed.drawing
-        yield self._download, "visible", found is not None and found.gains
+        return found if found is not None and found.gains else None
 
     def _send(self, who: Who) -> None:
-        found = self._feed.drawing
-        if found is not None and found.gains:
+        found = self._gained
+        if found is not None:
             data = encode_machine(found.machine, found.unseen)
-            self._services.downloads.send(who, "machine.json", data)
+            self._downloads.send(who, "machine.json", data)
 
 
 def open_table(field: str, _: Services, data: bytes, name: str) -> tuple[Action, str]:

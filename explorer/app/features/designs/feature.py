@@ -33,7 +33,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.page.session.latest import LatestWins
 from explorer.page.widgets.assigning import Update
-from explorer.page.widgets.palette import Command, Key, Run
+from explorer.page.widgets.palette import Command, Key
 
 # Ctrl+S saves in the library what a browser would save as a page.
 KEYS = {"Save": (Key("S", "cmd/ctrl"),)}
@@ -73,9 +73,16 @@ class SavedDesigns:
         services.at_end(self._requests.stop)
         self.refresh()
 
-    def find(self, name: str) -> Design | None:
-        """Return the saved design with a name; None if there is none that can be used."""
-        return next((each.design for each in self.entries if each.name == name), None)
+    def words_on(self, live: Design) -> tuple[str, str]:
+        """Return in a word and a sentence whether the saved design of its name is the live one."""
+        saved = next((each.design for each in self.entries if each.name == live.name), None)
+        if saved == live:
+            return "saved", "Saved."
+        if live == PRESETS.get(live.name):
+            return "preset", "An unchanged preset."
+        if saved is None:
+            return "not saved", "Not saved under a name yet; it comes back with the session."
+        return "changed", "Changed since it was saved."
 
     def refresh(self) -> None:
         """Request to read the folder again."""
@@ -211,7 +218,7 @@ class DesignName:
         name = f'<b class="ex-cut" data-document>{escape(live.name)}</b>'
         if self._saved is None:
             return f'<span class="ex-name">{name}</span>'
-        mark, words = saved_words(live, self._saved.find(live.name))
+        mark, words = self._saved.words_on(live)
         content = f'{name}<span class="ex-dim ex-small">{mark}</span>'
         hint = f"{words} Save, rename, open or upload designs."
         opens = open_button("Designs", content, hint=hint, class_name="ex-name")
@@ -230,34 +237,22 @@ class DesignName:
             client.add_notification(UNSAVED_LABEL, self._problem, color="orange")
 
 
-def saved_words(live: Design, saved: Design | None) -> tuple[str, str]:
-    """Return in a word and in a sentence whether the saved design of its name is the live one."""
-    if saved == live:
-        return "saved", "Saved."
-    if live == PRESETS.get(live.name):
-        return "preset", "An unchanged preset."
-    if saved is None:
-        return "not saved", "Not saved under a name yet; it comes back with the session."
-    return "changed", "Changed since it was saved."
-
-
-class DesignsPanel:
+class DesignsPanel(Controls):
     """The live design's name, buttons that save it, and the list of all designs."""
 
     def __init__(self, services: Services) -> None:
-        gui, session = services.gui, services.session
-        self._session = session
+        super().__init__(services)
+        gui, latest = services.gui, services.session.latest_state
         self._saved = saved = services.get(SavedDesigns)
-        self._controls = Controls(services)
-        self._controls.text(
+        self.text(
             "Name",
             "Name of the live design, under which it is saved.",
             ControlBinding(lambda frame: frame.state.design.name, lambda _, name: set_name(name)),
             disabled=lambda state: bool(state.busy),
         )
         actions: dict[str, Callable[[Who], None]] = {
-            "Save": lambda who: saved.save(session.latest_state().design, who),
-            "Save a copy": lambda who: saved.save_copy(session.latest_state().design, who),
+            "Save": lambda who: saved.save(latest().design, who),
+            "Save a copy": lambda who: saved.save_copy(latest().design, who),
             "Rename": self._rename,
             "Download": partial(send_design, services),
         }
@@ -269,9 +264,13 @@ class DesignsPanel:
         )
         self._buttons.on_click(lambda event: actions[self._buttons.value](event.client_id))
         for option, act in actions.items():
-            keys = KEYS.get(option, ())
-            services.commands.offer(self._buttons, _run(act), option=option, keys=keys)
-        self.status = gui.add_html("")
+            services.commands.offer(
+                self._buttons,
+                lambda client, act=act: act(client.client_id),
+                option=option,
+                keys=KEYS.get(option, ()),
+            )
+        self.markup(lambda frame: note(saved.words_on(frame.state.design)[1]))
         services.add_upload(
             "Open a file …",
             "A design, a table on six legs, a study or a session (JSON), what was measured of a "
@@ -282,15 +281,15 @@ class DesignsPanel:
             takes_drops=True,
         )
         self.list = gui.add_html("")
-        self.restore = gui.add_button(
+        self.restore = self.press(
             "Bring back",
-            color="gray",
+            "Restore the design that was deleted or replaced last.",
+            saved.restore,
             icon=viser.Icon.ARROW_BACK_UP,
-            hint="Restore the design that was deleted or replaced last.",
-            visible=False,
+            color="gray",
         )
-        self.restore.on_click(lambda event: saved.restore(event.client_id))
-        services.commands.offer(self.restore, _run(saved.restore))
+        self.follow(self.restore, "visible", lambda _: saved.last_deleted is not None)
+        self.follow(self.restore, "label", lambda _: f"Bring back {saved.last_deleted or ''}")
         acts = {"open": saved.open, "duplicate": saved.copy, "delete": saved.delete}
         for name, act in acts.items():
             services.buttons.on(
@@ -301,20 +300,13 @@ class DesignsPanel:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame and the saved designs."""
-        yield from self._controls.updates(frame)
-        live, base = frame.state.design, frame.state.base
-        _, words = saved_words(live, self._saved.find(live.name))
-        yield self.status, "content", note(words)
-        view = frame.state.view
+        yield from super().updates(frame)
+        base, view = frame.state.base, frame.state.view
         listed = self._saved.entries, base.name, view.lengths
         if listed != self._listed:
             self._listed = listed
             self._markup = list_designs(rows_of(self._saved.entries), base.name, view)
         yield self.list, "content", self._markup
-        deleted = self._saved.last_deleted
-        yield self.restore, "visible", deleted is not None
-        if deleted is not None:
-            yield self.restore, "label", f"Bring back {deleted}"
 
     def _rename(self, who: Who) -> None:
         state = self._session.latest_state()
@@ -366,11 +358,6 @@ def _line(row: LibraryFile, view: View, *, is_current: bool) -> str:
 def _link(act: str, name: str, words: str) -> str:
     hint = f"{words} {name}"
     return press_button(f"designs.{act}", name, words, hint=hint, label=hint, class_name="ex-link")
-
-
-def _run(act: Callable[[Who], None]) -> Run:
-    """Return the function that runs a command for a client by its id."""
-    return lambda client: act(client.client_id)
 
 
 DESIGNS = Feature(

@@ -42,7 +42,6 @@ from explorer.optimise.outcome import (
     encode_record,
 )
 from explorer.optimise.problem import YAW, ObjectiveName, Problem
-from explorer.page.widgets.assigning import Update
 
 OBJECTIVES: dict[str, ObjectiveName] = {
     "match a volume": "match-volume",
@@ -59,15 +58,17 @@ STEP = 0.001
 SIZE, PLACE = "0 0 280 120", (48.0, 222.0, 6.0, 78.0)
 
 
-class OptimisePanel:
+class OptimisePanel(Controls):
     """The controls of the problem, the search with its result, and the charts."""
 
     def __init__(self, services: Services) -> None:
-        gui = services.gui
+        super().__init__(services)
+        gui, verdict = services.gui, services.get(BuildVerdict)
+        # The run and the unit that are drawn, and their charts.
+        self._drawn: tuple[SearchRun | None, Unit | None, str] = (None, None, "")
         add_buttons(services)
-        self._controls = Controls(services)
         # By its class the stylesheet puts what follows it side by side, and keeps it in sight.
-        self._search = gui.add_html("")
+        self.markup(lambda frame: f'<div class="ex-columns">{search_words(frame.state)}</div>')
         with gui.add_folder("Problem"):
             self._add_problem()
             title = "Free variables"
@@ -75,20 +76,22 @@ class OptimisePanel:
             with folder, services.commands.within(title):
                 for name, hint in FREE.items():
                     self._add_free(name, hint)
-        self._result, self._verdict = gui.add_html(""), services.get(BuildVerdict)
-        self._plots = OptimisePlots(gui)
+        self.markup(lambda frame: result_words(frame.state, verdict.html()))
+        folder = gui.add_folder("Course of the search", visible=False)
+        self.follow(folder, "visible", lambda frame: self._charts(frame) != "")
+        with folder:
+            self.markup(self._charts)
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that show a frame."""
-        yield from self._controls.updates(frame)
-        search = f'<div class="ex-columns">{search_words(frame.state)}</div>'
-        yield self._search, "content", search
-        yield self._result, "content", result_words(frame.state, self._verdict.html())
-        yield from self._plots.updates(frame.state)
+    def _charts(self, frame: Frame) -> str:
+        """Return the charts of the last run, drawn again for another one, or another unit."""
+        run, unit = Optimisation.of(frame.state).run, frame.state.unit
+        if run is not self._drawn[0] or unit != self._drawn[1]:
+            charts = "" if run is None else "".join(course(run, frame.state))
+            self._drawn = run, unit, charts
+        return self._drawn[2]
 
     def _add_problem(self) -> None:
-        controls = self._controls
-        controls.dropdown(
+        self.dropdown(
             "Objective",
             "The measure that the search improves.",
             OBJECTIVES,
@@ -114,7 +117,7 @@ class OptimisePanel:
             "workspace all margins are at least a 20th of the reach that the search starts with; 0 "
             "for no demand.",
         )
-        controls.number(
+        self.number(
             "Starts",
             "Number of designs to start from: the present one, and others spread over the bounds.",
             At("optimisation.request.starts", convert=round),
@@ -136,7 +139,7 @@ class OptimisePanel:
             default=lambda state: getattr(complete_request(state), field),
         )
         label, power = CATALOGUE[measure].label.capitalize() + " ({unit})", CATALOGUE[measure].power
-        self._controls.number(label, hint, at, least=0.0, step=STEP, power=power, visible=visible)
+        self.number(label, hint, at, least=0.0, step=STEP, power=power, visible=visible)
 
     def _add_free(self, name: str, hint: str) -> None:
         def write(state: State, on: bool) -> Action:
@@ -145,7 +148,7 @@ class OptimisePanel:
             label = f"Free variable {FREE_LABELS.get(name, name)}"
             return Set("optimisation.request.free", chosen, label, "on" if on else "off")
 
-        self._controls.checkbox(
+        self.checkbox(
             FREE_LABELS.get(name, name),
             hint,
             ControlBinding(lambda frame: name in _request(frame.state).free, write),
@@ -154,27 +157,6 @@ class OptimisePanel:
 
 def _request(state: State) -> OptimisationRequest:
     return Optimisation.of(state).request
-
-
-class OptimisePlots:
-    """Charts with captions in a folder; hidden until there is a run."""
-
-    def __init__(self, gui: viser.GuiApi) -> None:
-        self._folder = gui.add_folder("Course of the search", visible=False)
-        with self._folder:
-            self._html = gui.add_html("")
-        # The run and the unit that are drawn.
-        self._drawn: tuple[SearchRun | None, Unit] | None = None
-
-    def updates(self, state: State) -> Iterator[Update]:
-        """Yield the updates that show the run of a state."""
-        run = Optimisation.of(state).run
-        if self._drawn is not None and self._drawn[0] is run and self._drawn[1] == state.unit:
-            return
-        self._drawn = run, state.unit
-        charts = "" if run is None else "".join(course(run, state))
-        yield self._folder, "visible", charts != ""
-        yield self._html, "content", charts
 
 
 def course(run: SearchRun, state: State) -> Iterator[str]:

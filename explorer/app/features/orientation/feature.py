@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, Services, Tab, html_of, show_html
+from explorer.app.features.feature import Feature, Services, Tab, html_of
 from explorer.app.features.orientation import maps, work
 from explorer.app.features.workspace.slice_map import AXES, keeps_above, level_within
 from explorer.app.inputs.bindings import item
@@ -21,7 +21,7 @@ from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.markup import alert, box, caption, dim, remark, row, table
-from explorer.app.widgets.under_way import UnderWay, look_of, problem
+from explorer.app.widgets.under_way import look_of, problem
 from explorer.measures.box import corners_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -53,19 +53,18 @@ _Angle = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 _PLACE = msgspec.json.Decoder(tuple[_Angle, _Angle])
 
 
-class OrientationPanel:
+class OrientationPanel(Controls):
     """The map of tilts with its numbers and angles, and what is drawn over the workspace."""
 
     def __init__(self, services: Services) -> None:
-        gui = services.gui
-        self._here = services.get(work.POSITION_FEED)
-        self._tilts = services.get(work.TILTS_FEED)
-        self._controls = controls = Controls(services)
+        super().__init__(services)
+        gui, self._here = services.gui, services.get(work.POSITION_FEED)
+        tilts = services.get(work.TILTS_FEED)
         self._top = gui.add_html("")
         self._map = gui.add_html("")
         self._legend = gui.add_html("")
         for axis, name in enumerate(work.ANGLES):
-            controls.slider(
+            self.slider(
                 f"{name.capitalize()} (°)",
                 HINTS[axis],
                 item(lambda frame: frame.state.tilt_torsion, axis, work.set_tilt_torsion),
@@ -73,14 +72,21 @@ class OrientationPanel:
                 disabled=None if axis else lambda state: state.tilt_torsion.tilt < LEVEL,
             )
         with gui.add_folder("Over the workspace"):
-            controls.checkbox(
+            self.checkbox(
                 "Greatest tilts",
                 "Draw the greatest tilt in every azimuth, at the present torsion, at nodes over "
                 "the workspace. The cut of the workspace opens them too.",
                 "view.tilts",
             )
-            self._scale = gui.add_html("", visible=False)
-            self._tilts_under_way = UnderWay(services, "tilts", self._tilts)
+            failed = "The tilts could not be computed", "Compute the tilts"
+            self.markup(
+                lambda frame: (
+                    box(html_of(tilts, maps.scale_of_tilts, *failed))
+                    if frame.state.view.tilts
+                    else ""
+                )
+            )
+            self.under_way("tilts", tilts)
         services.do_on_press("orientation.go", _tilt)
         services.buttons.on("orientation.read", _read)
 
@@ -96,11 +102,7 @@ class OrientationPanel:
         yield self._map, "content", box(maps.polar_map(tilts, least, here, home))
         title = caption("What ends the tilts, by share of azimuths")
         yield self._legend, "content", box(title, maps.legend(tilts))
-        yield from self._controls.updates(frame)
-        yield from self._tilts_under_way.updates()
-        title, button = "The tilts could not be computed", "Compute the tilts"
-        scale = html_of(self._tilts, maps.scale_of_tilts, title, button)
-        yield from show_html(self._scale, box(scale) if state.view.tilts else "")
+        yield from super().updates(frame)
 
 
 def _angles_at(text: str) -> tuple[float, float] | None:

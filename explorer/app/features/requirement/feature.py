@@ -145,14 +145,8 @@ class RequirementPanel(Controls):
         self, label: str, hint: str, act: Callable[[Requirement, Who], None]
     ) -> viser.GuiButtonHandle:
         """Add a button, whose action takes the requirement of the form."""
-        handle = self._services.gui.add_button(label, hint=hint, color=None)
-
-        def run(who: Who) -> None:
-            act(Required.of(self._services.session.latest_state()).form, who)
-
-        handle.on_click(lambda event: run(event.client_id))
-        self._services.commands.offer(handle, lambda client: run(client.client_id))
-        return handle
+        latest = self._session.latest_state
+        return self.press(label, hint, lambda who: act(Required.of(latest()).form, who))
 
     def _save(self, form: Requirement, who: Who) -> None:
         self._services.downloads.send(who, f"{form.name}.json", encode_requirement(form))

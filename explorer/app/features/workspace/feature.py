@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.features.feature import Feature, FileExport, Services, Tab, show_html
+from explorer.app.features.feature import Feature, FileExport, Services, Tab
 from explorer.app.features.workspace import feeds, words as texts, work
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
@@ -27,7 +27,7 @@ from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chips, StateCommand, turn
 from explorer.app.widgets.markup import alert, box, note, sentence
-from explorer.app.widgets.under_way import UnderWay, look_of
+from explorer.app.widgets.under_way import look_of
 from explorer.measures.position_bands import LOAD_MEASURES, MEASURE_WORDS
 from explorer.measures.verdict import warnings
 from explorer.mechanism.margins import MARGIN_KINDS
@@ -71,21 +71,19 @@ _Coordinate = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 _POSITION = msgspec.json.Decoder(tuple[_Coordinate, _Coordinate, _Coordinate])
 
 
-class WorkspacePanel:
+class WorkspacePanel(Controls):
     """The panel of the workspace."""
 
     def __init__(self, services: Services) -> None:
-        gui, session, buttons = services.gui, services.session, services.buttons
-        self._controls = controls = Controls(services)
-        self._session = session
+        super().__init__(services)
         self._feed = services.get(feeds.WORKSPACE_FEED)
         self._volumes = services.get(feeds.VOLUME_FEED)
         # The drawing whose solid is cut, and its map where the page shows it.
         self._drawing: work.WorkspaceDrawing | None = None
         self._mapped: SliceMap | None = None
-        self._show, self._cuts = _part_chips(services), _cut_chips(services)
-        self._top = gui.add_html("")
-        controls.dropdown(
+        self._show, cuts = _part_chips(services), _cut_chips(services)
+        self.markup(self._top)
+        self.dropdown(
             "Region",
             "All positions within the limits, those that a path without a collision of legs leads "
             "to, from home or from the present position, or those at which the load of the tab "
@@ -94,8 +92,8 @@ class WorkspacePanel:
             ControlBinding(_region, _set_region),
             is_in_palette=True,
         )
-        self._under_way = UnderWay(services, "workspace", self._feed)
-        self._trouble = gui.add_html("", visible=False)
+        self.under_way("workspace", self._feed)
+        self.markup(lambda _: self._trouble_words())
         self._start = services.link(
             "workspace.start",
             StateCommand(
@@ -104,14 +102,14 @@ class WorkspacePanel:
                 self._start_there,
             ),
         )
-        controls.dropdown(
+        self.dropdown(
             "Orientation",
             "The orientation of the platform all over the workspace.",
             ORIENTATIONS,
             "view.workspace.orientation",
             is_in_palette=True,
         )
-        controls.dropdown(
+        self.dropdown(
             "Colour by",
             f"One colour, the smallest margin |δ| ({MARGIN_KINDS}), 1 / cond J, what the load of "
             "Loads asks of actuators and struts, or how far errors of actuators or that load move "
@@ -120,9 +118,9 @@ class WorkspacePanel:
             "view.workspace.colour",
             is_in_palette=True,
         )
-        self._legend = gui.add_html("", visible=False)
-        self._cut = gui.add_html("")
-        controls.slider(
+        self.markup(self._legend)
+        self.markup(lambda frame: box(cuts.html(frame.state)))
+        self.slider(
             "Cut at ({unit})",
             "Position of the cutting plane on its axis.",
             ControlBinding(
@@ -133,10 +131,10 @@ class WorkspacePanel:
             power=1,
             disabled=lambda state: state.view.workspace.cut is None,
         )
-        self._map = gui.add_html("", visible=False)
-        with gui.add_folder("Details", expand_by_default=False):
-            self._details = gui.add_html("")
-            controls.slider(
+        self.markup(self._map)
+        with services.gui.add_folder("Details", expand_by_default=False):
+            self.markup(lambda frame: texts.workspace_details(frame, self._feed))
+            self.slider(
                 "Mesh tolerance ({unit})",
                 "Largest distance of a facet from the true surface.",
                 At("view.workspace.tolerance", default=feeds.tolerance_of),
@@ -144,37 +142,44 @@ class WorkspacePanel:
                 power=1,
             )
         services.do_on_press("workspace.go", _go_to)
-        buttons.on("workspace.read", self._read)
+        services.buttons.on("workspace.read", self._read)
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that show a frame."""
-        drawing = self._drawing = self._feed.drawing
+        self._drawing = self._feed.drawing
+        yield from super().updates(frame)
+
+    def _top(self, frame: Frame) -> str:
+        volume, drawn = texts.volume_headline(frame, self._volumes), self._feed
+        return box(volume, texts.drawing_words(frame, drawn), self._show.html(frame.state))
+
+    def _slice(self, state: State) -> SliceMap | None:
+        """Return the map of the drawing that is shown; None without a cut."""
+        is_cut = state.view.workspace.cut is not None
+        return self._drawing.slice_map if self._drawing is not None and is_cut else None
+
+    def _legend(self, frame: Frame) -> str:
         state, view = frame.state, frame.state.view.workspace
-        top = texts.volume_headline(frame, self._volumes), texts.drawing_words(frame, self._feed)
-        yield self._top, "content", box(*top, self._show.html(state))
-        yield from self._controls.updates(frame)
-        yield from self._under_way.updates()
-        yield from show_html(self._trouble, self._trouble_words())
-        mapped = None if drawing is None or view.cut is None else drawing.slice_map
         colour = feeds.measure_of_colour(state)
         words = texts.missing_input(view.colour) if colour != view.colour else ""
-        if colour != "plain" or mapped is not None:
+        if colour != "plain" or self._slice(state) is not None:
             measure = work.map_measure(state.design, colour, holds=view.region == "held")
             warn = warnings(state.design.reach, state.warn_below)
             warn_below = warn.condition if measure == "condition" else warn.margin
-            words += texts.legend(measure, warn_below, drawing, state.unit)
+            words += texts.legend(measure, warn_below, self._drawing, state.unit)
         if colour in LOAD_MEASURES and view.region != "held":
             any_direction = colour != "deflection"
             words += note(f"{texts.load_words(state, any_direction=any_direction)}.")
-        yield from show_html(self._legend, words)
-        yield self._cut, "content", box(self._cuts.html(state))
-        picture = ""
+        return words
+
+    def _map(self, frame: Frame) -> str:
+        state, mapped = frame.state, self._slice(frame.state)
         if mapped is not None:
             mapped = mapped.shift(state.offset(mapped.colouring.workspace.rotation))
-            picture = box(map_picture(mapped, state.position, state.design.reach, state.unit))
         self._mapped = mapped
-        yield from show_html(self._map, picture)
-        yield self._details, "content", texts.workspace_details(frame, self._feed)
+        if mapped is None:
+            return ""
+        return box(map_picture(mapped, state.position, state.design.reach, state.unit))
 
     def _level(self, state: State) -> float:
         """Return the level of the cut, or the level that a cut would have."""
