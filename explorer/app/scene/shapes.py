@@ -171,17 +171,6 @@ class Balls(Instances):
         yield from self.place(centres, None, np.repeat(radii[:, None], 3, axis=1))
 
 
-class Boxes(Instances):
-    """Boxes along the axes."""
-
-    def __init__(self, scene: viser.SceneApi, name: str, colours: list[Rgb]) -> None:
-        super().__init__(scene, name, box(), colours)
-
-    def span(self, lows: FloatArray, highs: FloatArray) -> Iterator[Update]:
-        """Yield the updates that span the boxes from lows (n, 3) to highs (n, 3)."""
-        yield from self.place(0.5 * (lows + highs), None, highs - lows)
-
-
 class Patch:
     """A translucent quadrilateral with an outline."""
 

@@ -146,12 +146,9 @@ class _Step(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class _Body(msgspec.Struct, forbid_unknown_fields=True):
-    """The second line.
+    """The second line: the index of the step that the page shows, and the number of the first one.
 
-    Attributes:
-        at: Index of the step that the page shows.
-        first: Number of the first step.
-        steps: The steps, the first one with the whole state.
+    Of the steps the first has the whole state.
     """
 
     at: Index
@@ -224,23 +221,13 @@ def _kinds() -> dict[str, Any]:
 
 
 def _state_of(values: dict[str, Any]) -> State:
-    """Return the state with values by their paths; what a part lacks is as in a new state.
-
-    Raises:
-        Exception: A value is missing, or a part refuses one.
-    """
-    own = {path: value for path, value in values.items() if "." not in path}
-    parts = {
-        name: kind(
-            **{
-                each.name: values[f"{name}.{each.name}"]
-                for each in saved_fields(kind)
-                if f"{name}.{each.name}" in values
-            }
-        )
-        for name, kind in FEATURE_PARTS.items()
-    }
-    return State(**own, parts=parts)
+    """Return the state with values by their paths; what a part lacks is as in a new state."""
+    fields: dict[str, dict[str, Any]] = {name: {} for name in ("", *FEATURE_PARTS)}
+    for path, value in values.items():
+        part, _, name = path.rpartition(".")
+        fields[part][name] = value
+    parts = {name: kind(**fields[name]) for name, kind in FEATURE_PARTS.items()}
+    return State(**fields[""], parts=parts)
 
 
 def _saved(value: Any) -> Any:

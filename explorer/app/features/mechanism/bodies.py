@@ -159,7 +159,7 @@ class Legs(ScenePart):
         self._joints = shapes.Rods(scene, "/legs/joints", [joint, rod, rod] * 2 + [joint] * 2)
         self._balls = shapes.Balls(scene, "/legs/balls", [rgb.BALL] * 4 + [joint] * 2)
         boxes = [rgb.RAIL, rgb.CARRIAGE, rgb.CARRIAGE]
-        self._guide = shapes.Boxes(scene, "/legs/guide", boxes)
+        self._guide = shapes.Instances(scene, "/legs/guide", shapes.box(), boxes)
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the legs of this frame."""
@@ -179,10 +179,10 @@ class Legs(ScenePart):
         yield from self._joint_rods(bases, tips, size)
         low, high = guide_span(placed)
         half, stations = 0.42 * size, (float(bases[1, 0]), float(bases[2, 0]))
-        lows = [(x - half, -0.4, RAIL_TOP - 0.1) for x in stations]
-        highs = [(x + half, 0.4, -0.2 * size) for x in stations]
         rail_low, rail_high = (low, -RAIL_HALF_WIDTH, PLATE_TOP), (high, RAIL_HALF_WIDTH, RAIL_TOP)
-        yield from self._guide.span(np.array([rail_low, *lows]), np.array([rail_high, *highs]))
+        lows = np.array([rail_low, *((x - half, -0.4, RAIL_TOP - 0.1) for x in stations)])
+        highs = np.array([rail_high, *((x + half, 0.4, -0.2 * size) for x in stations)])
+        yield from self._guide.place(0.5 * (lows + highs), None, highs - lows)
 
     def _joint_rods(self, bases: FloatArray, tips: FloatArray, size: float) -> Updates:
         rods: list[tuple[FloatArray, FloatArray]] = []

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from html import escape
 
 import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.paths import stops
-from explorer.app.features.paths.state import Paths, Stop, StopAt
+from explorer.app.features.paths.state import MOST_STOPS, Paths, Stop, StopAt
 from explorer.app.inputs.bindings import ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import Action
@@ -31,6 +32,8 @@ from explorer.numerics.number_text import (
 PRESENT, TYPED = "Present pose", "Typed numbers"
 MODES = tuple(f"Mode {mode}:  {mode_name(mode)}" for mode in range(8))
 OPTIONS = (PRESENT, *MODES, TYPED)
+# Values of the buttons of the rows.
+ROWS = tuple(map(str, range(MOST_STOPS)))
 # Decimals of typed angles and coordinates.
 DECIMALS = 9
 ZERO: Triple = (0.0, 0.0, 0.0)
@@ -83,19 +86,10 @@ def add_stops(services: Services, controls: Controls) -> None:
         "remove": stops.remove_stop,
     }
 
-    def on_row(name: str, change: Callable[[State, int], Action | None]) -> None:
-        def of_row(value: str) -> Callable[[State], Action | None] | None:
-            index = int(value) if value.isdecimal() else -1
-
-            def change_row(state: State) -> Action | None:
-                return change(state, index) if 0 <= index < len(stops.stops_of(state)) else None
-
-            return change_row
-
-        services.do_on_press(f"paths.{name}", of_row)
-
     for name, change in changes.items():
-        on_row(name, change)
+        services.do_on_press(
+            f"paths.{name}", lambda row, change=change: partial(_change_row, change, row), ROWS
+        )
     links = (
         services.link(
             "paths.add",
@@ -133,6 +127,12 @@ def add_stops(services: Services, controls: Controls) -> None:
         "text/csv",
         take,
     )
+
+
+def _change_row(
+    change: Callable[[State, int], Action | None], row: str, state: State
+) -> Action | None:
+    return change(state, int(row)) if int(row) < len(stops.stops_of(state)) else None
 
 
 def list_stops(state: State) -> str:

@@ -107,13 +107,6 @@ class Trouble:
     nearest: Triple | None = None
 
 
-def trouble_of(error: ExplorerError) -> Trouble:
-    """Return an error of the library as a trouble."""
-    if not isinstance(error, InvalidStartError):
-        return Trouble(str(error))
-    return Trouble(error.in_millimetres, None if error.nearest is None else triple(error.nearest))
-
-
 def find_part(
     selection: Selection, tolerance: float, watch: Watch
 ) -> tuple[PartVolume, Solid] | Trouble:
@@ -121,14 +114,8 @@ def find_part(
 
     The tolerance is that of chords; `watch` gets each stage.
     """
-    if selection.region == "accessible":
-        return _find_accessible(selection, tolerance, watch)
-    return _find_carried(selection, tolerance)
-
-
-def _find_accessible(
-    selection: Selection, tolerance: float, watch: Watch
-) -> tuple[PartVolume, Solid] | Trouble:
+    if selection.region != "accessible":
+        return _find_carried(selection, tolerance)
     try:
         accessible = accessible_part(
             selection.workspace,
@@ -137,8 +124,11 @@ def _find_accessible(
             tolerance=tolerance,
             watch=watch,
         )
+    except InvalidStartError as error:
+        nearest = None if error.nearest is None else triple(error.nearest)
+        return Trouble(error.in_millimetres, nearest)
     except ExplorerError as error:
-        return trouble_of(error)
+        return Trouble(str(error))
     nodes = accessible.accessible_node_count
     return PartVolume(accessible.accessible_volume, nodes, accessible.pairs), accessible.solid
 
