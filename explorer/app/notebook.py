@@ -145,12 +145,7 @@ def show(
 
 
 def _as_design(given: object) -> Design:
-    """Return a design from itself, the name of a preset or a file.
-
-    Raises:
-        InputError: The value is none of these.
-        DesignError: No such preset or file, or a file that holds no design.
-    """
+    """Return a design from itself, the name of a preset or a file; errors are those of `show`."""
     if isinstance(given, str):
         return load_design(given)
     if not isinstance(given, Design):

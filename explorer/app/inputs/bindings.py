@@ -54,8 +54,7 @@ class At:
     def bound(self, name: str, options: Mapping[str, object] | None = None) -> ControlBinding[Any]:
         """Return the binding of a control, whose label names the value in the history.
 
-        The options of a list have their values by their words; a control without them holds
-        the value.
+        The options of a list have their values by their words; others hold the value.
         """
         if options is not None:
             texts = {value: text for text, value in options.items()}

@@ -112,7 +112,6 @@ class Slider(Control[Any]):
     """A slider with one thumb or two, whose range and tinted parts follow the state.
 
     Attributes:
-        track: Its range.
         tinted: Function that returns the tinted parts of its track; None to tint none.
         colours: The strip behind its track and the function that returns the stops of the strip's
             gradient; None for a grey track.

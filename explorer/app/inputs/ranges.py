@@ -60,7 +60,6 @@ class Track:
     """The range of a slider, which follows the state and holds every value of its thumbs.
 
     Attributes:
-        handle: The slider.
         of_state: Range, or the function that returns it.
         closes_up: Whether it shows only the surroundings of the tinted parts.
     """

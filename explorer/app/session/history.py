@@ -32,7 +32,6 @@ class UserAction:
     """An action with its origin, which makes the events of one drag one gesture.
 
     Attributes:
-        action: The action.
         source: The control that it came from; a new object for an event that is part of no drag.
         time: Time of the event, in seconds.
         press: The press during which it happened; None for keys, and where none is known.

@@ -112,10 +112,7 @@ def value_text(value: object) -> str:
 
 @action("Open {design}", is_jump=True)
 def open_design(state: State, design: Design) -> State:
-    """Open a design in its home pose; parts of the state stay as they declare.
-
-    The action is refused while the design is being optimised.
-    """
+    """Open a design in its home pose, unless one is being optimised; parts stay as they declare."""
     state.check_free()
     return replace(open_state(design), **parts_kept_on_open(state.in_unit_of(design)))
 
@@ -151,7 +148,6 @@ class Set(Action):
 
     Attributes:
         at: Path of the value in the state, such as "view.singular.ball".
-        value: The new value.
         name: Name of the value in the history; the last name in the path if empty.
         text: The new value in the history; made from the value if empty.
     """

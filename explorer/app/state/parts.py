@@ -48,9 +48,6 @@ class FeaturePart:
 
     Its class names it, as in `class Studies(FeaturePart, name="studies")`. Every new state has a
     new one of each. What the state asks of a part, a part answers by what it overrides.
-
-    Attributes:
-        in_state: The name.
     """
 
     in_state: ClassVar[str]

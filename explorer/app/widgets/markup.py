@@ -60,10 +60,7 @@ def table(rows: Iterable[str], head: Sequence[str] = ()) -> str:
 
 
 def row(*cells: str, look: str = "", hint: str = "") -> str:
-    """Return a row of a table with cells of HTML, classes of the stylesheet, and its meaning.
-
-    The meaning is shown when a pointer rests on it.
-    """
+    """Return a row of a table with cells of HTML, classes of the stylesheet, and its hint."""
     classes = f' class="{look}"' if look else ""
     content = "".join(f"<td>{cell}</td>" for cell in cells)
     return f"<tr{classes}{_title(hint)}>{content}</tr>"

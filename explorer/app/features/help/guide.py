@@ -67,10 +67,7 @@ def _result(frame: Frame) -> Iterator[str]:
 
 @action(title_words)
 def end_course(state: State, title: str, own: State) -> State:
-    """Show the state as it would be if a course had set nothing.
-
-    The action is refused while a design is being optimised.
-    """
+    """Show the state as if a course had set nothing; refused while a design is being optimised."""
     del title
     return replace(own.restore_over(state), view=own.view)
 

@@ -201,9 +201,5 @@ def budget_of(request: BudgetRequest) -> BudgetDrawing:
 
 
 def budget_table(request: BudgetRequest) -> bytes:
-    """Return the tolerances of a budget as CSV.
-
-    Raises:
-        ExplorerError: As for `budget_of`.
-    """
+    """Return the tolerances of a budget as CSV; errors are those of `budget_of`."""
     return tolerance_csv(budget_of(request).costs).encode()

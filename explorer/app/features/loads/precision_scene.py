@@ -128,10 +128,7 @@ class DeflectedScene(ScenePart):
 
 
 def _displacements(precision: ToolPrecision, placed: Placed, points: FloatArray) -> FloatArray:
-    """Return the displacements (n, 3), in design units, of points (n, 3) of the platform.
-
-    The points are in scene units.
-    """
+    """Return displacements (n, 3), in design units, of platform points (n, 3) in scene units."""
     arms = (points - tool_point(placed)) / placed.scale
     x, y, z = precision.deflection[3:].tolist()
     # A product of matrices is much faster than `np.cross`.

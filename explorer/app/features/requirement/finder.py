@@ -22,8 +22,7 @@ class Finder:
     """Starts and cancels searches.
 
     Attributes:
-        requirement: The requirement of the last search.
-        found: What it has found; None before its first answer.
+        found: What the last search has found; None before its first answer.
         job: The search that is under way; None if none is.
     """
 

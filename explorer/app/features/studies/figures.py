@@ -201,10 +201,7 @@ def select_rows(
 
 
 def thin_out(rows: IntArray, keep: BoolArray, most: int) -> IntArray:
-    """Return at most `most` of some ascending rows, shape (n,), preferring those to keep.
-
-    Those to keep are thinned out too if they are more than `most`.
-    """
+    """Return at most `most` of some ascending rows (n,), those to keep first, thinned evenly."""
     if len(rows) <= most:
         return rows
     kept = _spread(rows[keep], most)

@@ -45,10 +45,7 @@ BUTTONS = {
 
 
 def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
-    """Return how far a study is and what its plots show, as HTML.
-
-    While it is running, its progress stands elsewhere.
-    """
+    """Return how far a study is, unless it is running, and what its plots show, as HTML."""
     study, count = drawing.results.study, drawing.results.count
     total = "" if drawing.is_complete else f" of {format_number(study.count)}"
     parts = [] if is_running else [f"<b>{format_number(count)}</b>{total} designs"]
@@ -148,8 +145,7 @@ def head(
 def acts(run: StudyRun | None, looks: str, *, is_new: bool, can_go_on: bool) -> str:
     """Return the buttons at the top of the tab as HTML, with those that say how plots look.
 
-    The study that is computed is None if none is, and `can_go_on` if the open one lacks
-    designs.
+    A study is computed if there is a run, and `can_go_on` if the open one lacks designs.
     """
     if is_missing("study"):
         buttons = extra_button("study") + ("" if is_new else _button("new"))

@@ -80,11 +80,7 @@ def study_feed(services: Services) -> StudyFeed:
 
 
 class StudyRunner:
-    """Starts, cancels and continues studies of the page, in a process of their own.
-
-    Attributes:
-        run: The study that is being computed; None if none is.
-    """
+    """Starts, cancels and continues studies of the page; `run` is the present one, or None."""
 
     def __init__(
         self,
