@@ -40,8 +40,7 @@ from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.studies.state import pick_design
 from explorer.app.features.view.feature import CAMERA_HINTS
 from explorer.app.features.workspace.words import CLAIM
-from explorer.app.inputs.bindings import At, ControlBinding
-from explorer.app.inputs.bound import Control
+from explorer.app.inputs.bindings import At, Control, ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.page import FEATURES, Page
 from explorer.app.scene.placing import Placed, ScenePart

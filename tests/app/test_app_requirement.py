@@ -22,9 +22,9 @@ from explorer.app.features.requirement.feature import (
     PREPARE,
     REQUIREMENT,
     Checklist,
+    Finder,
     RequirementPanel,
 )
-from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import EDGES, box_corners
 from explorer.app.features.requirement.state import CHECK_FEED, EXAMPLE, Required
 from explorer.app.server import FIRST_DESIGN

@@ -9,7 +9,10 @@ from typing import Any, Literal, Protocol, Unpack
 import viser
 
 from explorer.app.inputs.bindings import (
+    Conditions,
+    Control,
     ControlBinding,
+    Slider,
     Source,
     Value,
     bound_to,
@@ -17,7 +20,6 @@ from explorer.app.inputs.bindings import (
     span_in_unit,
     step_in_unit,
 )
-from explorer.app.inputs.bound import Conditions, Control, Slider
 from explorer.app.inputs.ranges import Intervals, Span, Track
 from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Action

@@ -12,6 +12,7 @@ import contextlib
 import sys
 from collections.abc import Callable, Container
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from html import escape
 
 import msgspec
@@ -93,10 +94,7 @@ class Buttons:
         The label names the command, from the tab to the option, and the hint is a sentence
         on it. It can be run while `is_ready` says so.
         """
-
-        def run(client: viser.ClientHandle) -> None:
-            self.press(name, value, client)
-
+        run = partial(self.press, name, value)
         self.commands.add(Command(label, hint, run, is_ready, keys=keys))
 
     def receive(self, text: str, client: viser.ClientHandle) -> None:

@@ -7,7 +7,7 @@ from html import escape
 
 import viser
 
-from explorer.app.features.feature import Feature, Services, Tab
+from explorer.app.features.feature import BarPart, Feature, Services, Tab
 from explorer.app.features.help.guide import CourseGuide
 from explorer.app.features.help.handout import handout_html
 from explorer.app.features.help.search import TITLE, SearchDialog
@@ -31,40 +31,28 @@ HINTS = {
 CAMERA = {"Turn": "drag, arrows", "Move": "right drag", "Zoom": "wheel", "Fly": "W A S D Q E"}
 
 
-class HelpButtons:
-    """The search, the theme and the help, as buttons of the bar."""
-
-    def __init__(self, services: Services) -> None:
-        presses: dict[str, Callable[[viser.ClientHandle], None]] = {
-            "Tour": services.get(CourseGuide).begin,
-            "Keys": lambda client: run_script_in(client, 'window.explorer.open("Help")'),
-            "Theme": services.theme.turn,
-        }
-        buttons = services.buttons
-        buttons.on(PRESS, lambda name, client: presses[name](client), values=presses)
-        for name in presses:
-            keys = KEYS.get(name, ())
-            buttons.offer(f"Page › {name}", HINTS[name], PRESS, name, keys=keys)
-        commands = open_button(
-            TITLE,
-            f"Search {keycap(str(palette.PALETTE_KEY))}",
-            hint="Search commands, all that stands on the page, and the manual.",
-            class_name="ex-tool ex-commands",
-        )
-        theme = press_button(
-            PRESS,
-            "Theme",
-            "",
-            hint=palette.with_keys(HINTS["Theme"], KEYS["Theme"]),
-            label="Theme",
-            class_name="ex-tool ex-theme",
-        )
-        help_ = open_button("Help", "Help", hint="Tour, manual and keys.", class_name="ex-tool")
-        self._markup = f"{commands}{theme}{help_}"
-
-    def __call__(self, _: Frame) -> str:
-        """Return the buttons as HTML."""
-        return self._markup
+def help_buttons(services: Services) -> BarPart:
+    """Return the search, the theme and the help, as buttons of the bar."""
+    presses: dict[str, Callable[[viser.ClientHandle], None]] = {
+        "Tour": services.get(CourseGuide).begin,
+        "Keys": lambda client: run_script_in(client, 'window.explorer.open("Help")'),
+        "Theme": services.theme.turn,
+    }
+    buttons = services.buttons
+    buttons.on(PRESS, lambda name, client: presses[name](client), values=presses)
+    for name in presses:
+        buttons.offer(f"Page › {name}", HINTS[name], PRESS, name, keys=KEYS.get(name, ()))
+    commands = open_button(
+        TITLE,
+        f"Search {keycap(str(palette.PALETTE_KEY))}",
+        hint="Search commands, all that stands on the page, and the manual.",
+        class_name="ex-tool ex-commands",
+    )
+    hint = palette.with_keys(HINTS["Theme"], KEYS["Theme"])
+    look = "ex-tool ex-theme"
+    theme = press_button(PRESS, "Theme", "", hint=hint, label="Theme", class_name=look)
+    help_ = open_button("Help", "Help", hint="Tour, manual and keys.", class_name="ex-tool")
+    return lambda _: f"{commands}{theme}{help_}"
 
 
 class HelpDialog:
@@ -156,6 +144,6 @@ def _row(words: str, caps: str) -> str:
 HELP = Feature(
     "help",
     tabs=(Tab("dialog", "Help", HelpDialog), Tab("dialog", TITLE, SearchDialog)),
-    bar=(("right", HelpButtons),),
+    bar=(("right", help_buttons),),
     runners=(CourseGuide,),
 )

@@ -154,9 +154,8 @@ class UndoButtons:
     @property
     def _deleted(self) -> str | None:
         """Name of the saved design that was deleted last, if nothing was done since."""
-        saved = self._saved
-        is_last = saved is not None and saved.deleted_at is self._session.history.step
-        return saved.last_deleted if saved is not None and is_last else None
+        saved, step = self._saved, self._session.history.step
+        return saved.last_deleted if saved is not None and saved.deleted_at is step else None
 
     def _button(self, name: str, history: History, *, is_busy: bool) -> str:
         # The step that "Undo" or "Redo" goes over.

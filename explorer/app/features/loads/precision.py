@@ -152,10 +152,8 @@ class PrecisionPanel(Controls):
 
     def _errors(self, frame: Frame) -> str:
         precision = self._loads.precision(frame)
-        design, errors = (
-            precision.loaded.design,
-            render(answers.tool_errors(precision), corner=self._copy),
-        )
+        design = precision.loaded.design
+        errors = render(answers.tool_errors(precision), corner=self._copy)
         if precision.has_errors and is_elastic(design):
             return errors
         return errors + offer("errors and stiffness", _typical(design)[1], self._assume)

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, cast
 import msgspec
 import viser
 
-from explorer.app.inputs.bindings import At, ControlBinding, Source
-from explorer.app.inputs.bound import Condition
+from explorer.app.inputs.bindings import At, Condition, ControlBinding, Source
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.parts import value_at, with_value

@@ -21,12 +21,7 @@ from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.markup import note
 from explorer.mechanism.design import DOWN
-from explorer.mechanism.machine import (
-    Payload,
-    Struts,
-    Tolerances,
-    inertia_problem,
-)
+from explorer.mechanism.machine import Payload, Struts, Tolerances, inertia_problem
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.number_text import format_number
 from explorer.page.widgets.palette import NO_OPTION

@@ -34,13 +34,7 @@ from explorer.export.drawings.markup import page_picture
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.numerics.number_text import Unit, format_number
-from explorer.optimise.outcome import (
-    OBJECTIVE_SYMBOLS,
-    Curve,
-    Iterate,
-    curves_of,
-    encode_record,
-)
+from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of, encode_record
 from explorer.optimise.problem import YAW, ObjectiveName, Problem
 
 OBJECTIVES: dict[str, ObjectiveName] = {

@@ -19,13 +19,7 @@ from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.jobs.jobs import LongJob
-from explorer.optimise.outcome import (
-    Iterate,
-    Outcome,
-    Settings,
-    compare_designs,
-    record_of,
-)
+from explorer.optimise.outcome import Iterate, Outcome, Settings, compare_designs, record_of
 from explorer.optimise.search.sqp import Trail
 from explorer.page.session.clock import Ticker
 

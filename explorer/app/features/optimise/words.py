@@ -279,7 +279,4 @@ def limit_rows(design: Design, unit: Unit) -> Iterator[tuple[str, str]]:
     radii = design.limits.leg_radii
     if any(radii):
         ends = sorted({min(radii), max(radii)})
-        yield (
-            "leg radii",
-            " to ".join(unit.number(end, LIMIT_DIGITS) for end in ends),
-        )
+        yield "leg radii", " to ".join(unit.number(end, LIMIT_DIGITS) for end in ends)

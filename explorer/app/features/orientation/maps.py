@@ -63,11 +63,6 @@ STOPS: tuple[Rgb, ...] = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 
 ROUND = 10.0
 
 
-def _round_up(tilt: float) -> float:
-    """Return the next ring from a tilt on, in degrees."""
-    return RING * math.ceil(tilt / RING - 1e-9)
-
-
 def colour_of(limit: str | None) -> Rgb:
     """Return the colour of a limit; None for no limit."""
     if limit is None:
@@ -77,9 +72,9 @@ def colour_of(limit: str | None) -> Rgb:
 
 
 def edge_of(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> float:
-    """Return the tilt at the edge of the map, in degrees."""
-    largest = float(np.nan_to_num(tilts.tilts).max())
-    return min(180.0, _round_up(max(LEAST_EDGE, here.tilt, home.tilt, largest)))
+    """Return the tilt at the edge of the map, a whole number of rings, in degrees."""
+    largest = max(LEAST_EDGE, here.tilt, home.tilt, float(np.nan_to_num(tilts.tilts).max()))
+    return min(180.0, RING * math.ceil(largest / RING - 1e-9))
 
 
 def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: TiltTorsion) -> str:

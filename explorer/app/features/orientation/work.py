@@ -27,10 +27,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.nodes import make_cell_grid
 from explorer.workspace.extremes import extent_of
-from explorer.workspace.orientations.share import (
-    OrientationShare,
-    orientation_share,
-)
+from explorer.workspace.orientations.share import OrientationShare, orientation_share
 from explorer.workspace.orientations.tilts import (
     TiltByTorsion,
     greatest_tilts,

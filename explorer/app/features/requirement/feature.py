@@ -1,4 +1,4 @@
-"""*What must it do?*: the form of the requirement, the machines found, and the checklist."""
+"""*What must it do?*: the form of the requirement, the search for machines, and the checklist."""
 
 from __future__ import annotations
 
@@ -8,9 +8,15 @@ import viser
 
 from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.requirement import words
-from explorer.app.features.requirement.finder import Finder
 from explorer.app.features.requirement.scene import RequiredBox
-from explorer.app.features.requirement.state import CHECK_FEED, FORM, Required, open_found
+from explorer.app.features.requirement.state import (
+    CHECK_FEED,
+    EXAMPLE,
+    FORM,
+    Required,
+    find_machines,
+    open_found,
+)
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import MAIN, Controls
 from explorer.app.session.session import Who
@@ -22,6 +28,7 @@ from explorer.app.state.state import State
 from explorer.app.widgets.buttons import open_button
 from explorer.app.widgets.markup import beside, box
 from explorer.app.widgets.under_way import look_of
+from explorer.find.answers import FoundDesigns
 from explorer.find.requirement import (
     PREFERENCES,
     Requirement,
@@ -29,6 +36,8 @@ from explorer.find.requirement import (
     encode_requirement,
     legs_from_row,
 )
+from explorer.jobs.jobs import LongJob
+from explorer.jobs.process import CANCELLED
 
 Field = tuple[str, str, float, str]
 """A number of the form: its label, its field, its step, and what it means."""
@@ -77,6 +86,61 @@ SAVE_HINT = "Download this requirement; its file opens again when it is dropped 
 ROW_HINT = "A row of a data sheet, such as: stroke 150 retracted 220 push 300 N speed 50 mm/s."
 
 CHECK = Set("required.is_checked", True, "Check the requirement")
+
+
+FIND = "find"
+"""Name of the process of the searches."""
+
+DIED = "the process of the search died; “Find machines” starts it again"
+# Seconds after which the process of a cancelled search is ended.
+PATIENCE = 2.0
+
+
+class Finder:
+    """Starts and cancels searches.
+
+    Attributes:
+        found: What the last search has found; None before its first answer.
+        job: The search that is under way; None if none is.
+    """
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+        self.requirement = EXAMPLE
+        self.found: FoundDesigns | None = None
+        self.job: LongJob | None = None
+        self._count = 0
+
+    def prepare(self) -> None:
+        """Start the processes of searches and checks, before they are needed."""
+        for process in (FIND, CHECK_FEED.process):
+            self._services.jobs.prepare(process, [find_machines.__module__])
+
+    def start(self, requirement: Requirement, who: Who = None) -> None:
+        """Search for machines, in place of a search that is under way."""
+        self.cancel()
+        self._count += 1
+        number, self.requirement, self.found = self._count, requirement, None
+
+        def receive(found: FoundDesigns | None, *, is_last: bool = False) -> None:
+            # What an earlier search still sends is dropped.
+            if number == self._count:
+                self.found, self.job = found or self.found, None if is_last else self.job
+                self._services.session.redraw()
+
+        def end(ending: FoundDesigns | str) -> None:
+            if isinstance(ending, str) and ending != CANCELLED:
+                self._services.complain(ending, who)
+            receive(None if isinstance(ending, str) else ending, is_last=True)
+
+        arguments, jobs = (requirement,), self._services.jobs
+        self.job = jobs.start(find_machines, arguments, end, end, receive, process=FIND, died=DIED)
+        self._services.session.redraw()
+
+    def cancel(self) -> None:
+        """End the search; what it has found is kept."""
+        if self.job is not None:
+            self.job.cancel(PATIENCE)
 
 
 class RequirementPanel(Controls):

@@ -7,14 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, Services, Tab, show
+from explorer.app.features.feature import BarPart, Feature, Services, Tab, show
 from explorer.app.features.mechanism import bodies
 from explorer.app.inputs.controls import Controls
 from explorer.app.scene.camera import VIEWS, ViewName
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import add_label
 from explorer.app.state.actions import Action, Set, draw_as
-from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import DrawnAs
 from explorer.app.widgets.buttons import open_button, press_button
@@ -117,30 +116,26 @@ def _form_chips(services: Services) -> Chips:
     return Chips(services.buttons, services.session, "view.form", "Drawn as", chips)
 
 
-class ViewButtons:
-    """A button for each of the views that CAD programs offer, one that fits all, and the menu."""
+def view_buttons(services: Services) -> BarPart:
+    """Return a button for each of the views that CAD programs offer, one for all, and the menu."""
+    cameras, markup = services.cameras, ""
 
-    def __init__(self, services: Services) -> None:
-        self._cameras = services.cameras
-        services.buttons.on(PRESS, self._point, values=CAMERA_HINTS)
-        self._markup = ""
-        for label, hint in CAMERA_HINTS.items():
-            keys = (Key(VIEW_KEYS[label]),)
-            services.buttons.offer(f"View › {label}", hint, PRESS, label, keys=keys)
-            words = with_keys(hint, keys)
-            self._markup += press_button(PRESS, label, label, hint=words, class_name="ex-tool")
-        hint = "Choose what the scene shows: the form of the mechanism, layers and tetrahedra."
-        self._markup += open_button(OVERLAYS, OVERLAYS, hint=hint, class_name="ex-tool is-menu")
-
-    def __call__(self, _: Frame) -> str:
-        """Return the buttons as HTML."""
-        return f'<span class="ex-views" role="toolbar" aria-label="Views">{self._markup}</span>'
-
-    def _point(self, label: str, client: viser.ClientHandle) -> None:
+    def point(label: str, client: viser.ClientHandle) -> None:
         if label == FIT:
-            self._cameras.fit(client)
+            cameras.fit(client)
         else:
-            self._cameras.point(client, LABELS[label])
+            cameras.point(client, LABELS[label])
+
+    services.buttons.on(PRESS, point, values=CAMERA_HINTS)
+    for label, hint in CAMERA_HINTS.items():
+        keys = (Key(VIEW_KEYS[label]),)
+        services.buttons.offer(f"View › {label}", hint, PRESS, label, keys=keys)
+        words = with_keys(hint, keys)
+        markup += press_button(PRESS, label, label, hint=words, class_name="ex-tool")
+    hint = "Choose what the scene shows: the form of the mechanism, layers and tetrahedra."
+    markup += open_button(OVERLAYS, OVERLAYS, hint=hint, class_name="ex-tool is-menu")
+    views = f'<span class="ex-views" role="toolbar" aria-label="Views">{markup}</span>'
+    return lambda _: views
 
 
 def _toggle_tetrahedra(state: State) -> Action:
@@ -292,7 +287,7 @@ VIEW = Feature(
     "view",
     manual="page.md",
     tabs=(Tab("dialog", OVERLAYS, OverlaysMenu),),
-    bar=(("right", ViewButtons),),
+    bar=(("right", view_buttons),),
     scene=(Ground,),
     commands=(
         StateCommand(

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from explorer.app.features.feature import Services, show
 from explorer.app.features.workspace import feeds, work
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.scene.shapes import NO_MESH, Patch, add_label, add_lines, add_translucent
+from explorer.app.scene.shapes import (
+    NO_MESH,
+    Patch,
+    add_label,
+    add_lines,
+    add_translucent,
+    write_label,
+)
 from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Drawn, Shell
 from explorer.app.state.frame import Frame
 from explorer.measures.box import corners_of
@@ -120,12 +127,8 @@ class WorkspaceScene(ScenePart):
         if broken is not None:
             name, slack, ends = broken
             yield self._broken, "points", (placed.scale * ends)[None].astype(np.float32)
-            yield (
-                self._broken_label,
-                "text",
-                f"{name}: {placed.frame.state.unit.text(-slack, 3)} beyond",
-            )
-            yield self._broken_label, "position", tuple((placed.scale * ends[1]).tolist())
+            words = f"{name}: {placed.frame.state.unit.text(-slack, 3)} beyond"
+            yield from write_label(self._broken_label, words, placed.scale * ends[1])
 
 
 def _most_broken(frame: Frame) -> tuple[str, float, FloatArray] | None:
