@@ -34,11 +34,11 @@ from explorer.app.features.requirement.state import EXAMPLE, Required
 from explorer.app.features.studies.state import Brush, Studies, brush_axes
 from explorer.app.session.history import UserAction
 from explorer.app.state.actions import Action, Set, open_design
-from explorer.app.state.folds import set_fold
 from explorer.app.state.geometry import set_variable
 from explorer.app.state.moves import (
     go_home,
     set_angle,
+    set_fold,
     set_joint,
     set_mode,
     set_position,

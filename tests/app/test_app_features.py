@@ -49,10 +49,16 @@ from explorer.app.session.feed import Feed
 from explorer.app.session.history import UserAction
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import Act, Set, mark_saved, set_name
-from explorer.app.state.folds import set_fold
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import set_variable
-from explorer.app.state.moves import set_angle, set_joint, set_pose, set_position, start_there
+from explorer.app.state.moves import (
+    set_angle,
+    set_fold,
+    set_joint,
+    set_pose,
+    set_position,
+    start_there,
+)
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.chips import StateCommand

@@ -30,9 +30,8 @@ from explorer.app.scene.placing import Placed
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, open_design
-from explorer.app.state.folds import folds_of, set_fold
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import set_mode, set_pose
+from explorer.app.state.moves import folds_of, set_fold, set_mode, set_pose
 from explorer.app.state.state import State, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.errors import InputError

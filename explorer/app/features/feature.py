@@ -15,6 +15,7 @@ import viser
 
 from explorer.app.scene.camera import Cameras
 from explorer.app.scene.placing import ScenePart
+from explorer.app.session.feed import Feed
 from explorer.app.session.session import Change, HistoryMove, Session, Who
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
@@ -23,10 +24,10 @@ from explorer.app.storage.user_data import Autosaver, UserData
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chips, StateCommand
 from explorer.app.widgets.downloads import Downloads
-from explorer.app.widgets.markup import dim
+from explorer.app.widgets.markup import alert, dim
 from explorer.app.widgets.theme import Theme
-from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
 from explorer.jobs.jobs import Jobs
+from explorer.numerics.number_text import format_decimals
 from explorer.page.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.page.look import call_script, read_script
 from explorer.page.widgets.assigning import Updates
@@ -35,6 +36,7 @@ from explorer.page.widgets.palette import STEP, Command, Commands
 Place = Literal["build", "analyse", "work", "dialog"]
 Side = Literal["left", "middle", "right"]
 Shared = TypeVar("Shared")
+AnyFeed = Feed[Any, Any]
 COPY_HINT = "Copy the command line of this answer; it reads design.json unless this is a preset."
 # Two sheets.
 COPY_ICON = (
@@ -134,8 +136,18 @@ class Services:
 
         self.buttons.on(name, press, values=values)
 
-    def link(self, name: str, command: StateCommand) -> str:
-        """Add a button that does a command, and offer it; return the button as HTML."""
+    def link(
+        self,
+        name: str,
+        label: str,
+        does: str,
+        change: Callable[[State], Action | None],
+        *,
+        is_ready: Callable[[State], bool] | None = None,
+        words: str = "",
+    ) -> str:
+        """Add a button that does a `StateCommand`, and offer it; return the button as HTML."""
+        command = StateCommand(label, does, change, is_ready=is_ready, words=words)
         Chips(self.buttons, self.session, name, "", {"": command})
         return command.html(name, "", "ex-link")
 
@@ -203,6 +215,29 @@ def follow_drags(
         if event.client_id is not None:
             stamp = gizmo.update_timestamp
             services.session.post(key, action_of, stamp=stamp, who=event.client_id)
+
+
+def progress(feed: AnyFeed) -> str:
+    """Return the progress of a drawing that is being computed, in words."""
+    stage = feed.stage
+    if stage is None:
+        return "computing …"
+    return f"computing the {stage.words}, {format_decimals(100.0 * stage.share, 0)} % done …"
+
+
+def problem(feed: AnyFeed, title: str, button: str) -> str:
+    """Return why there is no newer drawing of a feed, as HTML.
+
+    The title is that of a failure; the label is of the button that repeats what was cancelled.
+    """
+    if feed.is_cancelled:
+        return alert("Stopped", f"Press “{button}”, or change something, to compute it.")
+    return alert(title, feed.problem or "")
+
+
+def look_of(feed: AnyFeed) -> str:
+    """Return the class of what belongs to the drawing of a feed: pale while a newer one is made."""
+    return "" if feed.drawing is None or feed.is_current else "is-outdated"
 
 
 def html_of(feed: AnyFeed, html: Callable[[Any], str], title: str, button: str = "") -> str:

@@ -21,11 +21,11 @@ from explorer.app.inputs.bindings import (
     step_in_unit,
 )
 from explorer.app.inputs.ranges import Intervals, Span, Track
+from explorer.app.session.feed import Feed
 from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.under_way import AnyFeed
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
 from explorer.page.widgets.assigning import Update
@@ -264,7 +264,7 @@ class Controls:
         self._commands.offer(handle, lambda client: act(client.client_id), keys=keys)
         return handle
 
-    def under_way(self, what: str, feed: AnyFeed) -> None:
+    def under_way(self, what: str, feed: Feed[Any, Any]) -> None:
         """Add the buttons that stop and repeat the drawing of a feed, such as "workspace"."""
         hint, icon = f"End the present computation of the {what}.", viser.Icon.PLAYER_STOP
         stop = self.press(f"Stop computing the {what}", hint, lambda _: feed.cancel(), icon=icon)

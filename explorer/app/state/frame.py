@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from explorer.app.state.folds import folds_of
+from explorer.app.state.moves import folds_of
 from explorer.app.state.state import Folds, State
 from explorer.errors import InputError
 from explorer.legs.moves import MoveClearance, move_clearance

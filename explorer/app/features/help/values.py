@@ -15,10 +15,17 @@ from explorer.app.features.optimise.state import Optimisation
 from explorer.app.features.paths.actions import go
 from explorer.app.features.paths.state import Stop, journey_of
 from explorer.app.features.singularity.work import go_to_singularity
-from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, folds_of, set_fold
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import set_variable
-from explorer.app.state.moves import go_home, set_mode, set_position
+from explorer.app.state.moves import (
+    FIRST_FOLD,
+    HALF_TURN,
+    folds_of,
+    go_home,
+    set_fold,
+    set_mode,
+    set_position,
+)
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State
 from explorer.measures.verdict import TITLES

@@ -8,15 +8,8 @@ import numpy as np
 
 from explorer.app.features.feature import Feature, Services, Tab, show
 from explorer.app.inputs.controls import Controls
+from explorer.app.scene import shapes
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import (
-    SWEPT,
-    TETRAHEDRON_FACES,
-    add_label,
-    add_lines,
-    add_translucent,
-    write_label,
-)
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure
@@ -92,8 +85,8 @@ class ClearanceScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._line = add_lines(scene, "/clearance/line", 1, OUTLINE, 4.0)
-        self._label = add_label(scene, "/clearance/label", "0")
+        self._line = shapes.add_lines(scene, "/clearance/line", 1, OUTLINE, 4.0)
+        self._label = shapes.add_label(scene, "/clearance/label", "0")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the closest pair of this frame."""
@@ -108,7 +101,7 @@ class ClearanceScene(ScenePart):
             least = float(clearances.clearance[pair])
             clearance = state.unit.text(least, 3, size=state.design.reach)
             words = f"legs {pair_name(PAIRS[pair])}: {clearance}"
-            yield from write_label(self._label, words, ends.mean(axis=0))
+            yield from shapes.write_label(self._label, words, ends.mean(axis=0))
 
 
 class SweptTetrahedra(ScenePart):
@@ -120,18 +113,18 @@ class SweptTetrahedra(ScenePart):
     def __init__(self, services: Services) -> None:
         scene = services.scene
         self._meshes = [
-            add_translucent(
+            shapes.add_translucent(
                 scene,
                 f"/swept/{leg}",
-                (np.zeros((4, 3)), TRIANGLE if leg in (1, 4) else TETRAHEDRON_FACES),
+                (np.zeros((4, 3)), TRIANGLE if leg in (1, 4) else shapes.TETRAHEDRON_FACES),
                 OPACITY,
                 is_flat=True,
             )
             for leg in (1, 2, 3, 4)
         ]
         self._lines = (
-            (EDGES, add_lines(scene, "/swept/edges", 4 * len(EDGES), None, 1.5)),
-            (START, add_lines(scene, "/swept/starts", 4, None, 4.0)),
+            (EDGES, shapes.add_lines(scene, "/swept/edges", 4 * len(EDGES), None, 1.5)),
+            (START, shapes.add_lines(scene, "/swept/starts", 4, None, 4.0)),
         )
 
     def updates(self, placed: Placed) -> Updates:
@@ -145,7 +138,7 @@ class SweptTetrahedra(ScenePart):
         design = placed.frame.state.design
         ends = (Configuration.at(design, pose) for pose in (move.start, move.end))
         tetrahedra = placed.scale * swept_tetrahedra(*ends)
-        colours = [OUTLINE if overlaps else SWEPT for overlaps in legs_of(move.overlaps)]
+        colours = [OUTLINE if overlaps else shapes.SWEPT for overlaps in legs_of(move.overlaps)]
         for mesh, corners, colour in zip(self._meshes, tetrahedra, colours, strict=True):
             yield mesh, "vertices", corners.astype(np.float32)
             yield mesh, "color", colour

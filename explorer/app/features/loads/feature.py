@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import viser
 
-from explorer.app.features.feature import BarPart, Feature, Services, Tab
+from explorer.app.features.feature import BarPart, Feature, Services, Tab, problem
 from explorer.app.features.loads import load, precision
 from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEllipsoidScene
 from explorer.app.features.loads.scene import ForcesScene, LoadHandle
@@ -25,9 +25,7 @@ from explorer.app.state.state import State
 from explorer.app.state.view import Weighed
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure
-from explorer.app.widgets.chips import StateCommand
 from explorer.app.widgets.markup import note
-from explorer.app.widgets.under_way import problem
 from explorer.measures.blocks import forces
 from explorer.measures.blocks.block import Share, Statement
 from explorer.mechanism.machine import Guide
@@ -82,12 +80,10 @@ class ForcesPanel(Controls):
             )
         self._assume = services.link(
             "forces.typical",
-            StateCommand(
-                "Loads › Assume typical limits",
-                "Give actuators, struts and guide typical limits; the tab Machine shows and "
-                "changes them.",
-                assume_limits,
-            ),
+            "Loads › Assume typical limits",
+            "Give actuators, struts and guide typical limits; the tab Machine shows and "
+            "changes them.",
+            assume_limits,
         )
         self.markup(self._tables)
         self.markup(self._largest_loads)
@@ -96,22 +92,18 @@ class ForcesPanel(Controls):
         )
         self._go = services.link(
             "forces.go",
-            StateCommand(
-                "Loads › Go to the nearest position that holds",
-                "Move the platform to the nearest position that holds the load, turned as it is.",
-                self._go_to_nearest,
-                words="Go",
-            ),
+            "Loads › Go to the nearest position that holds",
+            "Move the platform to the nearest position that holds the load, turned as it is.",
+            self._go_to_nearest,
+            words="Go",
         )
         self._turn = services.link(
             "forces.worst",
-            StateCommand(
-                "Loads › Turn the force to its worst direction",
-                "Turn the force into the direction that uses the largest share of a limit here.",
-                self._turn_force,
-                is_ready=lambda state: any(state.view.forces.force),
-                words="Turn",
-            ),
+            "Loads › Turn the force to its worst direction",
+            "Turn the force into the direction that uses the largest share of a limit here.",
+            self._turn_force,
+            is_ready=lambda state: any(state.view.forces.force),
+            words="Turn",
         )
 
     def _summary(self, frame: Frame) -> str:

@@ -16,7 +16,6 @@ from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.chips import StateCommand
 from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks import precision as answers
 from explorer.measures.box import PositionSet
@@ -131,23 +130,19 @@ class PrecisionPanel(Controls):
             self.markup(self._budget_html)
         self._set = services.link(
             "precision.set",
-            StateCommand(
-                "Loads › Set these tolerances",
-                "Give the design these tolerances, and these errors of its actuators.",
-                self._set_tolerances,
-            ),
+            "Loads › Set these tolerances",
+            "Give the design these tolerances, and these errors of its actuators.",
+            self._set_tolerances,
         )
         self._copy = services.copy_button(
             "Loads › Precision", lambda state: self._loads.command("accuracy", state)
         )
         self._assume = services.link(
             "precision.typical",
-            StateCommand(
-                "Loads › Assume typical errors and stiffness",
-                "Give the design typical errors, stiffness, struts and tolerances where it states "
-                "none; the tab Machine shows and changes them.",
-                assume_typical,
-            ),
+            "Loads › Assume typical errors and stiffness",
+            "Give the design typical errors, stiffness, struts and tolerances where it states "
+            "none; the tab Machine shows and changes them.",
+            assume_typical,
         )
 
     def _errors(self, frame: Frame) -> str:

@@ -19,16 +19,10 @@ from explorer.app.features.feature import Services, show
 from explorer.app.inputs.bindings import item
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span, length_span
+from explorer.app.scene import shapes
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import (
-    add_label,
-    add_lines,
-    add_translucent,
-    of_one_colour,
-    write_label,
-)
-from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, set_fold
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import FIRST_FOLD, HALF_TURN, set_fold
 from explorer.app.state.state import State
 from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.margins import signs_of
@@ -129,17 +123,19 @@ class Leaves(ScenePart):
         scene = services.scene
         leaf, wedge = (np.zeros((3, 3)), TRIANGLE), (np.zeros((SEGMENTS + 2, 3)), FAN)
         self._leaves = [
-            add_translucent(scene, f"/leaves/{index}", leaf, OPACITY, colour=colour)
+            shapes.add_translucent(scene, f"/leaves/{index}", leaf, OPACITY, colour=colour)
             for index, colour in enumerate(LEAVES)
         ]
         self._wedges = [
-            add_translucent(scene, f"/leaves/wedge/{index}", wedge, WEDGE_OPACITY, colour=colour)
+            shapes.add_translucent(
+                scene, f"/leaves/wedge/{index}", wedge, WEDGE_OPACITY, colour=colour
+            )
             for index, colour in enumerate(MARGIN_COLOURS, start=1)
         ]
         self._edges = _add_lines(scene, "/leaves/edges", LEAVES, 3, EDGE)
         self._arcs = _add_lines(scene, "/leaves/arcs", MARGIN_COLOURS, SEGMENTS + 2, ARC)
         self._labels = [
-            add_label(scene, f"/leaves/label/{index}", "", colour=colour)
+            shapes.add_label(scene, f"/leaves/label/{index}", "", colour=colour)
             for index, colour in enumerate(MARGIN_COLOURS, start=1)
         ]
 
@@ -165,15 +161,15 @@ class Leaves(ScenePart):
         for index, label in enumerate(self._labels):
             name, fold = FOLDS[FIRST_FOLD + index], placed.frame.folds[FIRST_FOLD + index]
             words = f"{name} {format_decimals(fold, 0)}°"
-            yield from write_label(label, words, arcs[index, SEGMENTS // 2])
+            yield from shapes.write_label(label, words, arcs[index, SEGMENTS // 2])
 
 
 def _add_lines(
     scene: viser.SceneApi, name: str, colours: Iterable[Rgb], count: int, thickness: float
 ) -> viser.LineSegmentsHandle:
     """Add as many line segments of each colour."""
-    each = np.concatenate([of_one_colour(colour, count) for colour in colours])
-    lines = add_lines(scene, name, len(each), None, thickness)
+    each = np.concatenate([shapes.of_one_colour(colour, count) for colour in colours])
+    lines = shapes.add_lines(scene, name, len(each), None, thickness)
     lines.colors = each
     return lines
 

@@ -10,16 +10,8 @@ from explorer.app.features.feature import Services, show
 from explorer.app.features.mechanism import bodies
 from explorer.app.features.mechanism.incidences import HoveredRow
 from explorer.app.inputs.controls import Controls
+from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
-from explorer.app.scene.shapes import (
-    GHOST,
-    NO_MESH,
-    add_label,
-    add_lines,
-    add_translucent,
-    draw_mesh,
-    write_label,
-)
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import set_mode
 from explorer.app.widgets.buttons import press_button
@@ -144,11 +136,13 @@ class Ghosts(ScenePart):
         scene, self._hovered = services.scene, services.get(mode_hover)
         # Instanced meshes cannot change their shape, and these follow the design.
         self._plates = [
-            add_translucent(scene, f"/ghosts/platform/{i}", NO_MESH, 0.35, colour=GHOST)
+            shapes.add_translucent(
+                scene, f"/ghosts/platform/{i}", shapes.NO_MESH, 0.35, colour=shapes.GHOST
+            )
             for i in range(7)
         ]
-        self._legs = add_lines(scene, "/ghosts/legs", 28, GHOST, 1.2)
-        self._names = [add_label(scene, f"/ghosts/name/{i}", MODES[i]) for i in range(7)]
+        self._legs = shapes.add_lines(scene, "/ghosts/legs", 28, shapes.GHOST, 1.2)
+        self._names = [shapes.add_label(scene, f"/ghosts/name/{i}", MODES[i]) for i in range(7)]
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ghosts of this frame."""
@@ -163,7 +157,7 @@ class Ghosts(ScenePart):
         positions = placed.scale * each.position[modes]
         wxyzs = quaternion_from_rotation(each.rotation[modes])
         for plate, position, wxyz in zip(self._plates, positions, wxyzs, strict=False):
-            yield from draw_mesh(plate, plate_mesh)
+            yield from shapes.draw_mesh(plate, plate_mesh)
             yield plate, "position", tuple(position.tolist())
             yield plate, "wxyz", tuple(wxyz.tolist())
         tips = ghost_points(placed, modes)
@@ -172,7 +166,7 @@ class Ghosts(ScenePart):
         lines[: 4 * len(modes)] = bodies.leg_lines(placed, tips)
         yield self._legs, "points", lines.astype(np.float32)
         for label, mode, tip in zip(self._names, modes, tips[:, 0], strict=False):
-            yield from write_label(label, MODES[mode], tip)
+            yield from shapes.write_label(label, MODES[mode], tip)
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of cubes about the joints of the ghosts."""

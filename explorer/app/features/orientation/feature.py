@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, Services, Tab, html_of
+from explorer.app.features.feature import Feature, Services, Tab, html_of, look_of, problem
 from explorer.app.features.orientation import maps, work
 from explorer.app.features.workspace.slice_map import AXES, keeps_above, level_within
 from explorer.app.inputs.bindings import item
@@ -21,7 +21,6 @@ from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.markup import alert, box, caption, dim, remark, row, table
-from explorer.app.widgets.under_way import look_of, problem
 from explorer.measures.box import corners_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray

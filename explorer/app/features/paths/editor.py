@@ -17,7 +17,6 @@ from explorer.app.state.actions import Action
 from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.chips import StateCommand
 from explorer.errors import InputError
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.margins import mode_name
@@ -93,19 +92,15 @@ def add_stops(services: Services, controls: Controls) -> None:
     links = (
         services.link(
             "paths.add",
-            StateCommand(
-                "Paths › Add the present pose",
-                "Add the present pose to the path, after the chosen one or as the last.",
-                stops.add_present,
-            ),
+            "Paths › Add the present pose",
+            "Add the present pose to the path, after the chosen one or as the last.",
+            stops.add_present,
         ),
         services.link(
             "paths.close",
-            StateCommand(
-                "Paths › Back to the first pose",
-                "End the path in its first pose.",
-                stops.close_path,
-            ),
+            "Paths › Back to the first pose",
+            "End the path in its first pose.",
+            stops.close_path,
         ),
     )
     acts = f'<div class="ex-ends">{"".join(links)}</div>'

@@ -139,11 +139,9 @@ class PathsPanel(Controls):
         services.do_on_press("paths.cancel", lambda _: CANCEL)
         self._clear = services.link(
             "paths.clear",
-            StateCommand(
-                "Paths › Clear",
-                "Remove the path and its line.",
-                lambda state: None if journey_of(state) is None else CLEAR,
-            ),
+            "Paths › Clear",
+            "Remove the path and its line.",
+            lambda state: None if journey_of(state) is None else CLEAR,
         )
         buttons = services.buttons
         buttons.on("paths.export", self._export)

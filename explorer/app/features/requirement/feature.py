@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import viser
 
-from explorer.app.features.feature import Feature, Services, Tab
+from explorer.app.features.feature import Feature, Services, Tab, look_of
 from explorer.app.features.requirement import words
 from explorer.app.features.requirement.scene import RequiredBox
 from explorer.app.features.requirement.state import (
@@ -27,7 +27,6 @@ from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import open_button
 from explorer.app.widgets.markup import beside, box
-from explorer.app.widgets.under_way import look_of
 from explorer.find.answers import FoundDesigns
 from explorer.find.requirement import (
     PREFERENCES,

@@ -17,8 +17,8 @@ from explorer.app.features.singularity import scene, work
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import length_span
-from explorer.app.state.folds import FIRST_FOLD
 from explorer.app.state.frame import Frame
+from explorer.app.state.moves import FIRST_FOLD
 from explorer.app.state.view import Gain, Ghost
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure, press_button

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.features.feature import Feature, FileExport, Services, Tab
+from explorer.app.features.feature import Feature, FileExport, Services, Tab, look_of
 from explorer.app.features.workspace import feeds, words as texts, work
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
@@ -27,7 +27,6 @@ from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chips, StateCommand, turn
 from explorer.app.widgets.markup import alert, box, note, sentence
-from explorer.app.widgets.under_way import look_of
 from explorer.measures.position_bands import LOAD_MEASURES, MEASURE_WORDS
 from explorer.measures.verdict import warnings
 from explorer.mechanism.margins import MARGIN_KINDS
@@ -96,11 +95,9 @@ class WorkspacePanel(Controls):
         self.markup(lambda _: self._trouble_words())
         self._start = services.link(
             "workspace.start",
-            StateCommand(
-                "Workspace › Go there",
-                "Move the platform to that position and let the paths start from it.",
-                self._start_there,
-            ),
+            "Workspace › Go there",
+            "Move the platform to that position and let the paths start from it.",
+            self._start_there,
         )
         self.dropdown(
             "Orientation",

@@ -10,15 +10,8 @@ from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services, show
 from explorer.app.features.workspace import feeds, work
+from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.scene.shapes import (
-    NO_MESH,
-    Patch,
-    add_label,
-    add_lines,
-    add_translucent,
-    write_label,
-)
 from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Drawn, Shell
 from explorer.app.state.frame import Frame
 from explorer.measures.box import corners_of
@@ -60,21 +53,23 @@ class WorkspaceScene(ScenePart):
         colours = (COLLIDING, AT_LIMIT, PLAIN, *band_colours(), *UTILISATION_COLOURS, *STEP_COLOURS)
         self._colours: tuple[Rgb, ...] = tuple(dict.fromkeys(colours))
         self._shells = [
-            add_translucent(scene, f"/workspace/shell/{i}", NO_MESH, PLAIN_OPACITY, colour=colour)
+            shapes.add_translucent(
+                scene, f"/workspace/shell/{i}", shapes.NO_MESH, PLAIN_OPACITY, colour=colour
+            )
             for i, colour in enumerate(self._colours)
         ]
-        self._edges = add_lines(scene, "/workspace/edges", 1, EDGE_COLOUR, EDGE_THICKNESS)
+        self._edges = shapes.add_lines(scene, "/workspace/edges", 1, EDGE_COLOUR, EDGE_THICKNESS)
         self._hull = scene.add_mesh_simple(
             "/workspace/hull",
-            *NO_MESH,
+            *shapes.NO_MESH,
             color=HULL_COLOUR,
             wireframe=True,
             opacity=HULL_OPACITY,
             visible=False,
         )
         self._planes = [_SingularPlane(scene, index) for index in range(3)]
-        self._broken = add_lines(scene, "/workspace/broken/lines", 1, OUTLINE, 4.0)
-        self._broken_label = add_label(scene, "/workspace/broken/label", "limit")
+        self._broken = shapes.add_lines(scene, "/workspace/broken/lines", 1, OUTLINE, 4.0)
+        self._broken_label = shapes.add_label(scene, "/workspace/broken/label", "limit")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the workspace of a frame."""
@@ -128,7 +123,7 @@ class WorkspaceScene(ScenePart):
             name, slack, ends = broken
             yield self._broken, "points", (placed.scale * ends)[None].astype(np.float32)
             words = f"{name}: {placed.frame.state.unit.text(-slack, 3)} beyond"
-            yield from write_label(self._broken_label, words, placed.scale * ends[1])
+            yield from shapes.write_label(self._broken_label, words, placed.scale * ends[1])
 
 
 def _most_broken(frame: Frame) -> tuple[str, float, FloatArray] | None:
@@ -158,8 +153,8 @@ class _SingularPlane:
 
     def __init__(self, scene: viser.SceneApi, index: int) -> None:
         self._index = index
-        self._patch = Patch(scene, f"/singular/{index + 1}", PLANE_OPACITY)
-        self._label = add_label(scene, f"/singular/{index + 1}/label", f"δ{index + 1} = 0")
+        self._patch = shapes.Patch(scene, f"/singular/{index + 1}", PLANE_OPACITY)
+        self._label = shapes.add_label(scene, f"/singular/{index + 1}/label", f"δ{index + 1} = 0")
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the plane of a frame."""

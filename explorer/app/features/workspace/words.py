@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from explorer.app.features.feature import html_of
+from explorer.app.features.feature import html_of, problem, progress
 from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feeds import orientation_suffix, orientation_word
 from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Measure
@@ -14,7 +14,6 @@ from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.blocks import content_of
 from explorer.app.widgets.buttons import MANUAL, press_button
-from explorer.app.widgets.under_way import problem, progress
 from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
 from explorer.measures.blocks.block import UTILISATION_EDGES, Fact, Facts
 from explorer.measures.blocks.clearances import workspace_clearances
