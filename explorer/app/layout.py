@@ -9,9 +9,8 @@ from typing import get_args
 import viser
 
 from explorer.app.features.feature import Feature, Place, Services, Side, Tab
-from explorer.app.scene.camera import Cameras
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.buttons import MANUAL, Buttons, press_button
+from explorer.app.widgets.buttons import MANUAL, press_button
 from explorer.page.browser.viser_gaps import (
     dock_above_in,
     keep_arrangement,
@@ -87,21 +86,14 @@ class Panels:
 class Layout:
     """Lays out the panels, if the scene is not alone, and adapts the page to each new browser."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        buttons: Buttons,
-        cameras: Cameras,
-        panels: Panels | None,
-    ) -> None:
-        self._cameras = cameras
-        self._panels = panels
+    def __init__(self, services: Services, panels: Panels | None) -> None:
+        self._cameras, self._panels = services.cameras, panels
         if panels is not None:
             panels.lay_out()
             titles = {"drawer": panels.titles("work"), "dialogs": panels.titles("dialog")}
-            run_script(server, read_script("places", titles))
-        buttons.on(ROOM, self._settle, values=("narrow", "wide"))
-        server.on_client_connect(ask_for_room)
+            run_script(services.server, read_script("places", titles))
+        services.buttons.on(ROOM, self._settle, values=("narrow", "wide"))
+        services.server.on_client_connect(ask_for_room)
 
     def reset(self, client: viser.ClientHandle) -> None:
         """Put the panels of a browser into the places that they have at first."""

@@ -189,8 +189,7 @@ class Page:
         self.runners = [self.services.get(kind) for each in self._features for kind in each.runners]
         self.services.cameras.frame_first()
         self._panels = deque(self._add_panels() if panels else ())
-        shown = self.panels if panels else None
-        layout = Layout(server, self.buttons, self.services.cameras, shown)
+        layout = Layout(self.services, self.panels if panels else None)
         theme.begin(server)
         self.palette = self._add_palette(layout)
         for message in () if user_data is None else user_data.messages:

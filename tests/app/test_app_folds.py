@@ -16,7 +16,7 @@ from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.feature import JOINT_LABELS, MovePanel
+from explorer.app.features.mechanism.feature import JOINT_HINTS, MovePanel
 from explorer.app.features.mechanism.folds import (
     RADIUS,
     Leaves,
@@ -191,7 +191,7 @@ def test_choice_shows_six_sliders_in_place_of_six_and_is_kept(
         "φ3 (°)",
     ]
     desk.press(services.buttons, "view.coordinates", "lengths")
-    assert list(sliders_of(panel, desk)) == list(JOINT_LABELS.values())
+    assert list(sliders_of(panel, desk)) == list(JOINT_HINTS)
     # It stays with the next design, and in the file of the session.
     assert open_design(PRESETS["paper-initial"]).apply(after).view.coordinates == "folds"
     saved = decode_session(encode_session(start_history(after)), "test")

@@ -9,6 +9,7 @@ import signal
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -647,8 +648,14 @@ class Studio:
         self.desk = desk
         self.folders = StudyFolders(home)
         self.jobs = jobs
-        self.feed = StudyFeed(self.folders, self.jobs, lambda: None)
-        self.runner = StudyRunner(desk.session, self.feed, self.jobs, desk.complain)
+        services: Any = SimpleNamespace(
+            session=desk.session,
+            jobs=jobs,
+            complain=desk.complain,
+            get={study_folders: self.folders}.get,
+        )
+        self.runner = StudyRunner(services)
+        self.feed = self.runner.feed
 
     def wait_until_idle(self) -> None:
         """Wait until no study is computed."""

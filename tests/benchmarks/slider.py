@@ -27,7 +27,7 @@ from benchmarks.page import ready_page
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer.app.features.mechanism.feature import JOINT_LABELS
+from explorer.app.features.mechanism.feature import JOINT_HINTS
 from explorer.app.scene.placing import scene_scale
 from explorer.app.server import Running
 from explorer.app.state.actions import Set, open_design
@@ -85,7 +85,7 @@ def _slider_drag(running: Running, count: int) -> list[Message]:
     (uuid,) = (
         uuid
         for uuid, handle in handles._gui_input_handle_from_uuid.items()
-        if getattr(handle, "label", None) == JOINT_LABELS["l1"]
+        if getattr(handle, "label", None) == next(iter(JOINT_HINTS))
     )
     state = running.page.session.state
     return [

@@ -11,18 +11,17 @@ from likeness import decoded, likeness
 from playwright.sync_api import Locator, expect
 from tab import SIZE, TRACK, Tab
 
-from explorer.app.features.mechanism.feature import JOINT_LABELS
+from explorer.app.features.mechanism.feature import JOINT_HINTS
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.features.mechanism.modes import mode_hover
 from explorer.app.scene.placing import Placed
 from explorer.app.state.frame import Frame
 from explorer.app.state.moves import set_position
 from explorer.app.state.state import State, joints_of
-from explorer.mechanism.design import JOINTS
 from explorer.mechanism.kinematics import forward
 from explorer.numerics.arrays import FloatArray
 
-LABELS = [JOINT_LABELS[name] for name in JOINTS]
+LABELS = list(JOINT_HINTS)
 # The sliders by the words that show them.
 SLIDERS = {"Leg lengths": LABELS, "Pose": ["x", "y", "z", "yaw (°)", "pitch (°)", "roll (°)"]}
 

@@ -54,7 +54,6 @@ class Services:
     Attributes:
         complain: Function that shows a problem to one client, or to all for None.
         tell: Function that shows a message to a client, or to all if none is given.
-        theme: Theme of each browser, light or dark.
         cameras: Cameras of the browsers; they frame all that the features draw.
         user_data: The user's designs and session; None to save nothing.
         offers_tour: Whether the tour begins by itself in browsers that have not seen it.
@@ -124,10 +123,7 @@ class Services:
         change_of: Callable[[str], Action | Change | HistoryMove | None],
         values: Container[str] | None = None,
     ) -> None:
-        """Register that presses on the buttons with a name change the state, see `Buttons.on`.
-
-        The value of a button gives what its press does; None for nothing.
-        """
+        """Register what presses on a name do by their value, None for nothing; see `Buttons.on`."""
 
         def press(value: str, client: viser.ClientHandle) -> None:
             change = change_of(value)

@@ -41,10 +41,7 @@ Value = TypeVar("Value", float, bool, str, Pair, Triple)
 
 @dataclass(frozen=True)
 class ControlBinding(Generic[Value]):
-    """The binding of a control: how its value is read in a frame, and written as an action.
-
-    The action is None while the value does not change the state.
-    """
+    """How a control's value is read in a frame, and written as an action; None for no change."""
 
     read: Callable[[Frame], Value]
     write: Callable[[State, Value], Action | None]

@@ -79,7 +79,6 @@ class Feed(Generic[Request, Drawing]):
     The session, the process and the browsers change it, each on a thread of its own.
 
     Args:
-        kind: Its declaration.
         jobs: The processes, of which that of the page computes the drawings.
         redraw: Called when there is a new drawing, stage or problem.
 

@@ -60,7 +60,6 @@ class Session:
     """Holds the state, makes the changes that are posted, and passes each new frame on.
 
     Args:
-        state: The first state.
         draw: Called on the session's thread with each new frame.
         complain: Called with a message for people and the client it is for (None: all).
         report: Called with an unexpected exception; the session goes on.

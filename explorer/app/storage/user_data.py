@@ -45,7 +45,6 @@ class Autosaver:
     """Saves the newest history on a thread of its own, a moment after a change.
 
     Args:
-        store: Where the session is saved.
         notify: Called with one line for people when saving begins to fail, and when it works
             again, on the thread that saves.
 

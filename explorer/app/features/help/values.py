@@ -48,7 +48,6 @@ class Named:
             % of the reach if it is a length, or the word of a choice; None where it has none.
         set: Function from a state to one with another value; None if it cannot be set.
         options: The words of a choice; () for a number.
-        is_length: Whether it is a length.
     """
 
     read: Callable[[Frame, Frame], float | str | None]

@@ -42,8 +42,7 @@ LEAST_FORCE = 1e-6
 FITTING = 0.45
 
 
-def _force_words(_: State, force: Triple, *, keeps_scale: bool = False) -> str:
-    del keeps_scale
+def _force_words(_: State, force: Triple, **__: bool) -> str:
     return f"Force {', '.join(format_number(value, 3) for value in force)} N"
 
 

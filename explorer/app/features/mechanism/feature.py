@@ -29,7 +29,7 @@ from explorer.app.state.view import LengthName
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chips, StateCommand, choose
 from explorer.app.widgets.markup import alert, box, group, note, remark
-from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.page.look import read_file
 from explorer.page.widgets.palette import NO_OPTION, Key, shift
@@ -45,7 +45,6 @@ JOINT_HINTS = {
 }
 """Hints by the labels of the joints, in their order."""
 
-JOINT_LABELS = dict(zip(JOINTS, JOINT_HINTS, strict=True))
 ANGLES = (
     ("yaw", "about the base's z, the first of three", 180.0),
     ("pitch", "about the y that yaw turned, the second of three", 90.0),

@@ -158,12 +158,10 @@ def plan(
     weighed: Weighed,
     density: float,
 ) -> tuple[tuple[Pose, ...], tuple[int, ...]]:
-    """Return a path along poses, as `explorer.paths.planning.plan_path` finds it between two.
+    """Return the corners of a path along poses, and the index of each of these among them.
 
-    It is given by its corners, with the index of each of the poses among them.
-
-    If there is a load to hold, the weights of bodies act besides; the density of the parts is in
-    kg/m³.
+    Between two poses `explorer.paths.planning.plan_path` finds it. If there is a load to hold, the
+    weights of bodies act besides; the density of the parts is in kg/m³.
     """
     weights = own = None
     if load is not None:

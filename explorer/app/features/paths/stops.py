@@ -24,8 +24,7 @@ from explorer.mechanism.pose import Pose
 SAME = 1e-9
 
 
-def _stops_words(_: State, stops: tuple[Stop, ...], chosen: int | None, text: str) -> str:
-    del stops, chosen
+def _stops_words(_: State, __: object, ___: object, text: str) -> str:
     return text
 
 

@@ -199,7 +199,8 @@ class RequirementPanel(Controls):
         hint = "What a search may choose besides the machine and the yaw of the box."
         self.dropdown("Free", hint, FREE, f"{FORM}.free")
         hint = "Gravity pulls from the base to the platform."
-        self.checkbox("Hanging", hint, ControlBinding(_is_hanging, _hang))
+        hangs = ControlBinding(lambda frame: Required.of(frame.state).form.gravity[2] > 0.0, _hang)
+        self.checkbox("Hanging", hint, hangs)
         gui.add_html(beside(2))
         self._row = gui.add_text("Data sheet", "", hint=ROW_HINT)
         self._button("Read the row", "Take the values of the row into the form.", self._read_row)
@@ -232,10 +233,6 @@ class RequirementPanel(Controls):
             change = Set(FORM, each.requirement, "Requirement", each.words)
             self._services.session.do(change, who=client.client_id)
             self._finder.start(each.requirement, client.client_id)
-
-
-def _is_hanging(frame: Frame) -> bool:
-    return Required.of(frame.state).form.gravity[2] > 0.0
 
 
 def _hang(_: State, on: bool) -> Action:

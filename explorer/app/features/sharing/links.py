@@ -73,11 +73,9 @@ def decode_link(fragment: str) -> Link:
 
 @action("Open the link to {design}", is_jump=True)
 def open_link(state: State, link: Link) -> State:
-    """Open the design of a link in its pose, with its view and requirement.
+    """Open the design of a link with pose, view and requirement, unless one is being optimised.
 
     Other lengths, as those of the next path, stay in mm, unless both views are in design units.
-
-    The action is refused while the design is being optimised.
     """
     state.check_free()
     view = state.view if state.view.lengths == "mm" else link.view

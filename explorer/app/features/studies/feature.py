@@ -29,7 +29,7 @@ from explorer.app.features.studies.state import (
     pick_design,
 )
 from explorer.app.features.studies.words import BUTTONS, acts, chips, head, legend, table
-from explorer.app.features.studies.work import study_feed, study_runner
+from explorer.app.features.studies.work import StudyRunner, study_feed
 from explorer.app.inputs.bindings import At, ControlBinding
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
@@ -100,7 +100,7 @@ class StudiesPanel(Controls):
         gui.add_html(beside(2))
         self._services = services
         self._complain = services.complain
-        self.runner, self.feed = services.get(study_runner), services.get(study_feed)
+        self.runner, self.feed = services.get(StudyRunner), services.get(study_feed)
         self.choice = self.dropdown(
             "Study",
             "A study of the data folder, or one named on the command line.",
@@ -291,7 +291,7 @@ class StudyChip:
     """How far the study is, and the button that ends it."""
 
     def __init__(self, services: Services) -> None:
-        self._runner = services.get(study_runner)
+        self._runner = services.get(StudyRunner)
 
     def __call__(self, _: Frame) -> str:
         """Return the chip, as HTML; "" while no study is computed."""

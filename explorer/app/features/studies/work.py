@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from explorer.app.features.studies.feed import StudyFeed
 from explorer.app.features.studies.folders import keep_study, study_folders, study_in
 from explorer.app.features.studies.state import Studies, StudyPlan, open_study, study_around
-from explorer.app.session.session import Session, Who
+from explorer.app.session.session import Who
 from explorer.errors import ExplorerError
 from explorer.files.extras import check_extra
-from explorer.jobs.jobs import Jobs, LongJob
+from explorer.jobs.jobs import LongJob
 from explorer.jobs.process import Channel
 from explorer.mechanism.design import Design
 from explorer.sweep.run import Progress, run_study
@@ -68,30 +68,18 @@ def run_in_worker(study: Study, folder: Path, channel: Channel) -> Progress:
         workers.shutdown(cancel_futures=True)
 
 
-def study_runner(services: Services) -> StudyRunner:
-    """Return the runner of the studies of a page, with their drawings; for `Services.get`."""
-    feed = StudyFeed(services.get(study_folders), services.jobs, services.session.redraw)
-    return StudyRunner(services.session, feed, services.jobs, services.complain)
-
-
 def study_feed(services: Services) -> StudyFeed:
     """Return the drawings of the open study of a page; for `Services.get`."""
-    return services.get(study_runner).feed
+    return services.get(StudyRunner).feed
 
 
 class StudyRunner:
     """Starts, cancels and continues studies of the page; `run` is the present one, or None."""
 
-    def __init__(
-        self,
-        session: Session,
-        feed: StudyFeed,
-        jobs: Jobs,
-        complain: Callable[[str, Who], None],
-    ) -> None:
-        self._session, self._jobs = session, jobs
-        self.feed = feed
-        self._complain = complain
+    def __init__(self, services: Services) -> None:
+        self._session, self._jobs = services.session, services.jobs
+        self._complain = services.complain
+        self.feed = StudyFeed(services.get(study_folders), self._jobs, self._session.redraw)
         self._lock = threading.Lock()
         self.run: StudyRun | None = None
         self._job: LongJob | None = None
