@@ -27,7 +27,6 @@ from explorer.app.features.feature import Services
 from explorer.app.features.loads.load import Loads, weights_of_parts
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.paths.actions import (
-    DrivesRequest,
     SetLaw,
     advance_journey,
     draw_drives,
@@ -85,6 +84,7 @@ from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State, joints_of, open_state
 from explorer.errors import InputError
 from explorer.jobs.jobs import Jobs
+from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import forward
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
@@ -93,7 +93,7 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import LEAST, MOST
 from explorer.numerics.number_text import UNITS
-from explorer.paths.drives import drives_along, law_of_path
+from explorer.paths.drives import TimedPath, drives_along, law_of_path
 from explorer.paths.loads import path_loads
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
@@ -724,7 +724,7 @@ def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
 # Speeds and forces along the path
 
 
-def drives_request(state: State) -> DrivesRequest:
+def drives_request(state: State) -> tuple[Design, TimedPath]:
     request = request_for(state)
     assert request is not None
     return request

@@ -289,7 +289,9 @@ class DesignsPanel(Controls):
             color="gray",
         )
         self.follow(self.restore, "visible", lambda _: saved.last_deleted is not None)
-        self.follow(self.restore, "label", lambda _: f"Bring back {saved.last_deleted or ''}")
+        self.follow(
+            self.restore, "label", lambda _: f"Bring back {saved.last_deleted or ''}".rstrip()
+        )
         acts = {"open": saved.open, "duplicate": saved.copy, "delete": saved.delete}
         for name, act in acts.items():
             services.buttons.on(

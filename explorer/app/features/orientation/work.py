@@ -93,9 +93,6 @@ PARTS = 10
 # Digits of a torsion in degrees beyond which tilts are not computed again.
 DIGITS = 3
 
-PositionRequest: TypeAlias = tuple[Design, Triple, Triple | None]
-"""A request for the orientations that a position of b4, or of a tool point, can have."""
-
 
 @dataclass(frozen=True)
 class PositionDrawing:
@@ -105,15 +102,11 @@ class PositionDrawing:
     by_torsion: TiltByTorsion
 
 
-def orientations_at(request: PositionRequest) -> PositionDrawing:
-    """Return the orientations that a position can have."""
+def orientations_at(request: tuple[Design, Triple, Triple | None]) -> PositionDrawing:
+    """Return the orientations that a position of b4, or of a tool point, can have."""
     design, position, tool = request
     share = orientation_share(design, position, tool=tool)
     return PositionDrawing(share, tilt_by_torsion(design, position, tool=tool))
-
-
-TiltsRequest: TypeAlias = tuple[Design, float, Triple | None]
-"""A request for the greatest tilts over the workspace of one torsion, in degrees, of a tool."""
 
 
 @dataclass(frozen=True)
@@ -128,8 +121,13 @@ class TiltsDrawing:
     step: float
 
 
-def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> TiltsDrawing:
-    """Return the greatest tilts over the workspace of tilt zero; `channel` sends progress."""
+def tilts_at_nodes(
+    request: tuple[Design, float, Triple | None], channel: Channel | None = None
+) -> TiltsDrawing:
+    """Return the greatest tilts of a tool over the workspace of tilt zero at a torsion in degrees.
+
+    The channel sends progress.
+    """
     (design, torsion, tool), watch = request, watch_of(channel)
     rotation = rotation_from_tilt_torsion((0.0, 0.0, torsion))
     ends = extent_of(Workspace(design, rotation))
@@ -148,14 +146,14 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     return TiltsDrawing(nodes[known], tilts[known], step)
 
 
-def _tilts_of(frame: Frame) -> TiltsRequest | None:
+def _tilts_of(frame: Frame) -> tuple[Design, float, Triple | None] | None:
     if not frame.state.view.tilts:
         return None
     torsion = round(frame.state.tilt_torsion.torsion, DIGITS)
     return frame.state.design, torsion, frame.state.tool
 
 
-PositionFeed: TypeAlias = Feed[PositionRequest, PositionDrawing]
+PositionFeed: TypeAlias = Feed[tuple[Design, Triple, Triple | None], PositionDrawing]
 POSITION_FEED = FeedOf(
     orientations_at, lambda frame: (frame.state.design, frame.state.position, frame.state.tool)
 )

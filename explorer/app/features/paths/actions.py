@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TypeAlias
 
 from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.features.paths.state import Journey, Paths, StopAt, journey_of
@@ -177,10 +176,6 @@ def plan(
     return tuple(corners), tuple(places)
 
 
-DrivesRequest: TypeAlias = tuple[Design, TimedPath]
-"""A path of a design."""
-
-
 @dataclass(frozen=True, eq=False)
 class DrivesDrawing:
     """The actuators' speeds, forces and powers along a path, and the charts as SVG."""
@@ -189,13 +184,13 @@ class DrivesDrawing:
     charts: str
 
 
-def request_for(state: State) -> DrivesRequest | None:
-    """Return the path of a state in its time; None without a path."""
+def request_for(state: State) -> tuple[Design, TimedPath] | None:
+    """Return the design and the path of a state in its time; None without a path."""
     journey = journey_of(state)
     return None if journey is None else (journey.design, journey.path)
 
 
-def draw_drives(request: DrivesRequest) -> DrivesDrawing | ExplorerError:
+def draw_drives(request: tuple[Design, TimedPath]) -> DrivesDrawing | ExplorerError:
     """Return the actuators' speeds, forces and powers along a path, or why there are none."""
     try:
         found = drives_along(*request)
