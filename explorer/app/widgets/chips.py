@@ -66,17 +66,6 @@ class StateCommand:
             is_disabled=state is not None and not self.can_run(state),
         )
 
-    def offer(self, buttons: Buttons, session: Session, name: str, value: str = "") -> None:
-        """Offer it as a press on a button of the page."""
-        buttons.offer(
-            self.label,
-            self.does,
-            name,
-            value,
-            lambda: self.can_run(session.state),
-            keys=self.keys,
-        )
-
     def of(self, session: Session) -> Command:
         """Return the command for a session."""
 
@@ -131,8 +120,8 @@ class Chips:
             lambda value, client: session.do(commands[value].change, who=client.client_id),
             values=commands,
         )
-        for value, each in commands.items():
-            each.offer(buttons, session, name, value)
+        for each in commands.values():
+            buttons.commands.add(each.of(session))
 
     def html(self, state: State) -> str:
         """Return the row with its title as HTML."""

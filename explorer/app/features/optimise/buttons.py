@@ -86,7 +86,7 @@ def add_buttons(services: Services) -> None:
 
     for name, each in BUTTONS.items():
         services.buttons.on(name, partial(press, name))
-        each.offer(services.buttons, services.session, name)
+        services.commands.add(each.of(services.session))
 
 
 def button(

@@ -136,22 +136,20 @@ class PathsPanel(Controls):
         with gui.add_folder("Drives"):
             self.markup(self._drives_html)
         services.do_on_press("paths.play", lambda on: actions.play(on == "on"), ("on", "off"))
-        services.do_on_press("paths.cancel", lambda _: CANCEL)
         self._clear = services.link(
             "paths.clear",
             "Paths › Clear",
             "Remove the path and its line.",
             lambda state: None if journey_of(state) is None else CLEAR,
         )
-        buttons = services.buttons
-        buttons.on("paths.export", self._export)
-        buttons.offer(
+        services.link(
+            "paths.cancel",
             "Paths › Cancel planning",
             "Stop the search for a path.",
-            "paths.cancel",
-            is_ready=lambda: Paths.of(self._session.state).is_planning,
+            lambda state: CANCEL if Paths.of(state).is_planning else None,
         )
-        buttons.offer(
+        services.buttons.on("paths.export", self._export)
+        services.buttons.offer(
             "Paths › Export CSV",
             "Save time, joints and pose along the path, in equal times of each move.",
             "paths.export",
