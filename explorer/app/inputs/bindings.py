@@ -17,7 +17,7 @@ import viser
 from explorer.app.inputs.ranges import (
     Intervals,
     Span,
-    Track,
+    close_up,
     decimals,
     in_whole_steps,
     tint_marks,
@@ -221,24 +221,25 @@ class Control(Generic[Value]):
             self._is_set_here = False
             yield self.handle, "value", value
 
-    def _is_own(self, value: Value) -> bool:
-        """Whether a value is the one that was last set with the control itself."""
-        return self._is_set_here and (value == self._last_value or self.session.is_waiting(self))
-
 
 @dataclass(eq=False, kw_only=True)
 class Slider(Control[Any]):
     """A slider with one thumb or two, whose range and tinted parts follow the state.
 
     Attributes:
+        span: Range of its track, or the function that returns it.
+        closes_up: Whether the track shows only the surroundings of its tinted parts.
         tinted: Function that returns the tinted parts of its track; None to tint none.
         colours: The strip behind its track and the function that returns the stops of the strip's
             gradient; None for a grey track.
     """
 
-    track: Track
+    span: Span | Callable[[State], Span]
+    closes_up: bool = False
     tinted: Callable[[Frame], Intervals] | None = None
     colours: tuple[viser.GuiHtmlHandle, Callable[[Frame, Span], str]] | None = None
+    _shown: Span | None = field(default=None, init=False)
+    _whole: Span | None = field(default=None, init=False)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the slider show the frame, its range first."""
@@ -248,10 +249,14 @@ class Slider(Control[Any]):
                 yield self.colours[0], "visible", False
             return
         value: float | Pair = self.bound.read(frame)
-        ends = value if isinstance(value, tuple) else (value,)
         tinted = () if self.tinted is None else self.tinted(frame)
-        span = self.track.span(frame.state, ends, tinted, is_own=self._is_own(value))
-        yield from self.track.updates(span)
+        span = self._range(frame.state, value, tinted)
+        if span != self._shown:
+            self._shown = span
+            yield self.handle, "min", span.low
+            yield self.handle, "max", span.high
+            yield self.handle, "step", span.step
+            yield self.handle, "precision", decimals(span.step)
         if self.tinted is not None:
             yield self.handle, MARKS, slider_marks(tint_marks(tinted, span))
         if self.colours is not None:
@@ -263,6 +268,21 @@ class Slider(Control[Any]):
             size = max(abs(span.low), abs(span.high))
             value = snap_to_decimals(value, decimals(span.step), size)
         yield from self._show(frame.state, value)
+
+    def _range(self, state: State, value: float | Pair, tinted: Intervals) -> Span:
+        """Return the range of the track, which holds the values of the thumbs.
+
+        After a change of the slider itself it may only grow, so that it holds still under the
+        pointer, unless the range in the state has changed.
+        """
+        whole = self.span if isinstance(self.span, Span) else self.span(state)
+        span = close_up(whole, tinted, self._shown) if self.closes_up else whole
+        low, high = min(span.low, *parts_of(value)), max(span.high, *parts_of(value))
+        is_own = self._is_set_here and (value == self._last_value or self.session.is_waiting(self))
+        if is_own and self._shown is not None and whole == self._whole:
+            low, high = min(low, self._shown.low), max(high, self._shown.high)
+        self._whole = whole
+        return Span(low, high, span.step)
 
 
 class Conditions(TypedDict, total=False):

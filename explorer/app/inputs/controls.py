@@ -20,7 +20,7 @@ from explorer.app.inputs.bindings import (
     span_in_unit,
     step_in_unit,
 )
-from explorer.app.inputs.ranges import Intervals, Span, Track
+from explorer.app.inputs.ranges import Intervals, Span
 from explorer.app.session.feed import Feed
 from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Action
@@ -29,7 +29,7 @@ from explorer.app.state.state import State
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
 from explorer.page.widgets.assigning import Update
-from explorer.page.widgets.palette import NO_OPTION, Key, WithCommands
+from explorer.page.widgets.palette import NO_OPTION, Commands, Key
 
 # Colour of viser by which the stylesheet tells the main button of a tab from the others.
 MAIN: Literal["blue"] = "blue"
@@ -37,8 +37,18 @@ MAIN: Literal["blue"] = "blue"
 MOST_DECIMALS = 9
 
 
-class WithControls(WithCommands, Protocol):
-    """A page whose controls post to a session."""
+class WithControls(Protocol):
+    """A page whose controls have commands and post to a session."""
+
+    @property
+    def gui(self) -> viser.GuiApi:
+        """The API that adds controls."""
+        ...
+
+    @property
+    def commands(self) -> Commands:
+        """The commands of the page."""
+        ...
 
     @property
     def session(self) -> Session:
@@ -118,7 +128,8 @@ class Controls:
             self._session,
             handle,
             self._bound(handle, at, label, power=power),
-            track=Track(handle, span, closes_up=closes_up),
+            span=span,
+            closes_up=closes_up,
             tinted=tinted,
             colours=colours,
             **conditions,
@@ -146,9 +157,7 @@ class Controls:
         fields = self._gui.add_vector2(f"{label} ends", (0.0, 1.0), step=0.01, hint=hint)
         untyped: Any = thumbs
         shown, bound = (span_in_unit(span, power), in_unit(at, power)) if power else (span, at)
-        self._controls.append(
-            Slider(self._session, untyped, bound, track=Track(thumbs, shown), **conditions)
-        )
+        self._controls.append(Slider(self._session, untyped, bound, span=shown, **conditions))
         self._bind(fields, bound, lambda state: shown(state).step, **conditions)
 
     def number(

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeAlias
-
-import viser
 
 from explorer.app.state.state import State
 from explorer.mechanism.configuration import Point, point_of
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
 from explorer.mechanism.feasible_intervals import Interval, possible_ranges
 from explorer.numerics.number_text import Unit
-from explorer.page.widgets.assigning import Update
 
 # Least width of a close-up over the whole range, and least part of the track that is tinted before
 # the close-up is made anew.
@@ -53,50 +49,6 @@ def unit_step(step: float, unit: Unit) -> float:
 
 Intervals: TypeAlias = tuple[Interval, ...]
 """Disjoint ascending intervals, in the unit of a slider's value; an end may be infinite."""
-
-
-@dataclass(eq=False)
-class Track:
-    """The range of a slider, which follows the state and holds every value of its thumbs.
-
-    Attributes:
-        of_state: Range, or the function that returns it.
-        closes_up: Whether it shows only the surroundings of the tinted parts.
-    """
-
-    handle: viser.GuiSliderHandle[float] | viser.GuiMultiSliderHandle[float]
-    of_state: Span | Callable[[State], Span]
-    closes_up: bool = False
-    _shown: Span | None = field(default=None, init=False)
-    _whole: Span | None = field(default=None, init=False)
-
-    def span(
-        self, state: State, values: tuple[float, ...], tinted: Intervals = (), *, is_own: bool
-    ) -> Span:
-        """Return the range in a state, for the values of the thumbs and the tinted parts.
-
-        After a change of the slider itself, its own, the range may only grow, so that it
-        holds still under the pointer, unless `of_state` has changed.
-        """
-        whole = self.of_state if isinstance(self.of_state, Span) else self.of_state(state)
-        span = whole
-        if self.closes_up:
-            span = close_up(span, tinted, self._shown)
-        low, high = min(span.low, *values), max(span.high, *values)
-        if is_own and self._shown is not None and whole == self._whole:
-            low, high = min(low, self._shown.low), max(high, self._shown.high)
-        self._whole = whole
-        return Span(low, high, span.step)
-
-    def updates(self, span: Span) -> Iterator[Update]:
-        """Yield the updates that give the slider its range."""
-        if span == self._shown:
-            return
-        self._shown = span
-        yield self.handle, "min", span.low
-        yield self.handle, "max", span.high
-        yield self.handle, "step", span.step
-        yield self.handle, "precision", decimals(span.step)
 
 
 def tint_marks(intervals: Intervals, span: Span) -> tuple[float, ...]:

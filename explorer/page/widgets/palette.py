@@ -12,7 +12,7 @@ import contextlib
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import viser
 
@@ -132,20 +132,6 @@ class Commands:
     def add(self, command: Command) -> None:
         """Add a command without a control."""
         self._others.append(command)
-
-
-class WithCommands(Protocol):
-    """A page that has controls and commands."""
-
-    @property
-    def gui(self) -> viser.GuiApi:
-        """The API that adds controls."""
-        ...
-
-    @property
-    def commands(self) -> Commands:
-        """The commands of the page."""
-        ...
 
 
 class Palette:

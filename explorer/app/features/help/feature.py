@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import cache
 from html import escape
 
 import viser
@@ -11,12 +12,11 @@ from explorer.app.features.feature import BarPart, Feature, Services, Tab
 from explorer.app.features.help.guide import CourseGuide
 from explorer.app.features.help.handout import handout_html
 from explorer.app.features.help.search import TITLE, SearchDialog
-from explorer.app.state.frame import Frame
+from explorer.app.inputs.controls import Controls
 from explorer.app.widgets.buttons import MANUAL, open_button, press_button
 from explorer.app.widgets.markup import box, caption, dim
 from explorer.page.browser.viser_gaps import run_script_in
 from explorer.page.widgets import palette
-from explorer.page.widgets.assigning import Updates
 
 PRESS, LESSON, HANDOUT = "page", "lesson", "lesson.handout"
 KEYS = {"Theme": (palette.shift("L"),), "Keys": (palette.Key("K"),)}
@@ -55,25 +55,21 @@ def help_buttons(services: Services) -> BarPart:
     return lambda _: f"{commands}{theme}{help_}"
 
 
-class HelpDialog:
+class HelpDialog(Controls):
     """The tour, the lessons, the manual, and all keys of the page."""
 
     def __init__(self, services: Services) -> None:
+        super().__init__(services)
         buttons = (
             press_button(PRESS, "Tour", "Tour", class_name="ex-button") + dim(HINTS["Tour"]),
             press_button(MANUAL, "page.md", "Manual", class_name="ex-button")
             + dim("All pages, beside the scene."),
         )
-        self._rows = "".join(f'<div class="ex-row" data-closes>{each}</div>' for each in buttons)
-        self._rows += lessons_html(services)
-        self._html = services.gui.add_html("")
-        self._services = services
-        self._markup = ""
-
-    def updates(self, _: Frame) -> Updates:
-        """Yield the markup with the keys, which are known once all features are made."""
-        self._markup = self._markup or box(self._rows + keys_table(self._services.commands.all))
-        yield self._html, "content", self._markup
+        rows = "".join(f'<div class="ex-row" data-closes>{each}</div>' for each in buttons)
+        rows += lessons_html(services)
+        # The keys are known once all features are made.
+        content = cache(lambda: box(rows, keys_table(services.commands.all)))
+        self.markup(lambda _: content())
 
 
 def lessons_html(services: Services) -> str:

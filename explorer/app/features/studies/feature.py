@@ -287,27 +287,21 @@ def _set_plan(change: Callable[[StudyPlan, str], StudyPlan], name: str) -> Chang
     )
 
 
-class StudyChip:
-    """How far the study is, and the button that ends it."""
-
-    def __init__(self, services: Services) -> None:
-        self._runner = services.get(StudyRunner)
-
-    def __call__(self, _: Frame) -> str:
-        """Return the chip, as HTML; "" while no study is computed."""
-        run = self._runner.run
-        if run is None:
-            return ""
-        cancel = press_button(
-            "studies.cancel",
-            "",
-            "Cancel",
-            hint=BUTTONS["cancel"][1],
-            class_name="ex-button",
-            is_disabled=run.is_cancelled,
-        )
-        done = 0 if run.progress is None else run.progress.done
-        return activity("Studies", run.name, f"{format_number(done)} designs", run.share, cancel)
+def study_chip(runner: StudyRunner) -> str:
+    """Return how far a study is and the button that ends it, as HTML; "" without one."""
+    run = runner.run
+    if run is None:
+        return ""
+    cancel = press_button(
+        "studies.cancel",
+        "",
+        "Cancel",
+        hint=BUTTONS["cancel"][1],
+        class_name="ex-button",
+        is_disabled=run.is_cancelled,
+    )
+    done = 0 if run.progress is None else run.progress.done
+    return activity("Studies", run.name, f"{format_number(done)} designs", run.share, cancel)
 
 
 def open_study_file(services: Services, data: bytes, name: str) -> tuple[Action, str]:
@@ -338,7 +332,7 @@ STUDIES = Feature(
     "studies",
     manual="studies.md",
     tabs=(Tab("work", "Studies", StudiesPanel, viser.Icon.CHART_DOTS),),
-    bar=(("right", StudyChip),),
+    bar=(("right", lambda services: lambda _: study_chip(services.get(StudyRunner))),),
     later_feeds=(study_feed,),
     exports=(
         FileExport(
