@@ -134,6 +134,6 @@ def _message(role: str, look: str, title: str, body: str) -> str:
     return f'<div role="{role}" class="{look}">{head}{escape(body)}</div>'
 
 
-def sentence(message: str) -> str:
-    """Return a message with a capital and a full stop."""
-    return f"{message[:1].upper()}{message[1:]}{'' if message.endswith('.') else '.'}"
+def sentence(*messages: str) -> str:
+    """Return messages, each with a capital and a full stop."""
+    return " ".join(f"{m[:1].upper()}{m[1:]}{'' if m.endswith('.') else '.'}" for m in messages)

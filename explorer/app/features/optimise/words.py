@@ -133,7 +133,7 @@ def search_words(state: State) -> str:
     undecided = Optimisation.of(state).undecided
     is_success = undecided is not None and undecided.has_converged
     verdict = "" if run is None or run.verdict is None else verdict_words(state, run, run.verdict)
-    why = " ".join(markup.sentence(refusal.message) for refusal in refusals)
+    why = markup.sentence(*(refusal.message for refusal in refusals))
     has_result = run is not None and run.best is not None
     acts = buttons.button(
         buttons.START,

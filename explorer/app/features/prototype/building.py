@@ -16,6 +16,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import with_machine
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import figure, press_button
+from explorer.app.widgets.chips import Chips, StateCommand
 from explorer.app.widgets.markup import dim, row, sentence, status, table
 from explorer.measures.blocks.block import Look
 from explorer.mechanism.design import LENGTHS, Design
@@ -51,19 +52,15 @@ class BuildVerdict:
     """The verdict as HTML, the same wherever it stands."""
 
     def __init__(self, services: Services) -> None:
-        self._feed, session = services.get(BUILD_FEED), services.session
-        services.do_on_press(
-            MEND, lambda what: partial(self._mend, what), values=(FITTING, STROKES)
-        )
-        for what, words, hint in (
-            (FITTING, "Make the parts fit", "Set the least unit with which the parts fit."),
-            (STROKES, STROKES_WORDS, STROKES_HINT),
-        ):
-
-            def is_ready(what: str = what) -> bool:
-                return self._mend(what, session.state) is not None
-
-            services.buttons.offer(f"Prototype › {words}", hint, MEND, what, is_ready)
+        self._feed = services.get(BUILD_FEED)
+        commands = {
+            what: StateCommand(f"Prototype › {words}", hint, partial(self._mend, what))
+            for what, words, hint in (
+                (FITTING, "Make the parts fit", "Set the least unit with which the parts fit."),
+                (STROKES, STROKES_WORDS, STROKES_HINT),
+            )
+        }
+        Chips(services.buttons, services.session, MEND, "", commands)
 
     def html(self) -> str:
         """Return whether the machine can be built, with the press that mends it."""
@@ -80,7 +77,7 @@ class BuildVerdict:
         if not self._feed.is_current:
             return figure("Prototype", "Buildable", "…", hint="The new design is being checked.")
         clauses = (*built.problems, built.advice) if built.problems else (strokes_problem(built),)
-        hint = " ".join(map(sentence, clauses))
+        hint = sentence(*clauses)
         return figure("Prototype", "Buildable", words, hint=hint, look="ex-beyond")
 
     def _mend(self, what: str, state: State) -> Set | None:
@@ -122,7 +119,7 @@ def verdict_words(built: Buildability) -> str:
         head, problems = "Strokes too short", [strokes_problem(built)]
         can_limit = built.within_strokes is not None
         press = _button(STROKES, STROKES_WORDS, STROKES_HINT) if can_limit else ""
-    words = escape(" ".join(map(sentence, problems)))
+    words = escape(sentence(*problems))
     return f"{_status(head, 'beyond')}<div>{words}</div>{press}"
 
 

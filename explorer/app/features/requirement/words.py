@@ -60,9 +60,9 @@ def result(found: FoundDesigns | None, *, is_searching: bool) -> Iterator[str]:
         cards = "".join(_card(i, one) for i, one in enumerate(found.designs))
         yield f'<div class="ex-machines" data-closes>{cards}</div>'
     if found.impossible:
-        yield markup.alert(IMPOSSIBLE, _sentences(*found.impossible))
+        yield markup.alert(IMPOSSIBLE, markup.sentence(*found.impossible))
     elif not found.designs and not is_searching:
-        yield markup.alert(NOT_FOUND, _sentences("relax a demand"))
+        yield markup.alert(NOT_FOUND, markup.sentence("relax a demand"))
     elif found.bound_mm > 0.0:
         least = round_down(found.bound_mm)
         yield f'<div class="ex-dim">No machine has legs below {least} mm.</div>'
@@ -72,10 +72,6 @@ def result(found: FoundDesigns | None, *, is_searching: bool) -> Iterator[str]:
         for index, each in enumerate(found.nearest)
     )
     yield f'<div class="ex-chips">{chips}</div>'
-
-
-def _sentences(*clauses: str) -> str:
-    return " ".join(map(markup.sentence, clauses))
 
 
 def _card(index: int, one: FoundDesign) -> str:
@@ -132,7 +128,7 @@ def _demand_row(demand: DemandCheck) -> str:
     level, mark = ("within", "✓") if demand.kept else ("beyond", missed)
     name = escape(f"{demand.words[:1].upper()}{demand.words[1:]}")
     content = f'<span>{name}</span><span>{values}</span><span class="ex-{level}">{mark}</span>'
-    hint = "Proven." if demand.proven else _sentences(demand.remark or "checked in poses")
+    hint = "Proven." if demand.proven else markup.sentence(demand.remark or "checked in poses")
     if demand.pose is not None:
         hint += " A press goes to the worst pose."
     return press_button(GO, demand.name, content, hint=hint, is_disabled=demand.pose is None)

@@ -97,22 +97,17 @@ class OverlaysMenu(Controls):
 
 def _form_chips(services: Services) -> Chips:
     """Return the options of what the mechanism is drawn as; a press on one again goes back."""
-
-    def chip(form: DrawnAs, hint: str, keys: tuple[Key, ...]) -> StateCommand:
-        def is_on(state: State) -> bool:
-            return state.view.drawn_as == form
-
-        name = draw_as(form).text
-        return StateCommand(
-            f"{OVERLAYS} › Drawn as › {name}",
+    chips = {
+        form: StateCommand(
+            f"{OVERLAYS} › Drawn as › {draw_as(form).text}",
             hint,
-            lambda state: draw_as("schematic" if is_on(state) else form),
-            is_on,
+            lambda state, form=form: draw_as("schematic" if state.view.drawn_as == form else form),
+            lambda state, form=form: state.view.drawn_as == form,
             keys=keys,
-            words=name.capitalize(),
+            words=draw_as(form).text.capitalize(),
         )
-
-    chips = {form: chip(form, *words) for form, words in FORMS.items()}
+        for form, (hint, keys) in FORMS.items()
+    }
     return Chips(services.buttons, services.session, "view.form", "Drawn as", chips)
 
 
