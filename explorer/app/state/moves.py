@@ -13,13 +13,13 @@ margin is −180° in its neighbour with a negative one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from explorer.app.state import state as states
-from explorer.app.state.actions import action
+from explorer.app.state.actions import Words, action
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import Folds, GivenFolds, State, joints_of, open_state
 from explorer.errors import InputError
@@ -48,11 +48,21 @@ def go_home(state: State) -> State:
     return move_to(state, open_state(state.design).pose)
 
 
-def _joint_words(after: State, joint: int, value: float) -> str:
-    return f"{JOINTS[joint]} = {after.unit.text(value, 6, size=after.design.reach)}"
+def value_words(names: Sequence[str], first_angle: int = 0) -> Words:
+    """Return the words of an action that sets a named value by its index.
+
+    Those before the index of the first angle are lengths; angles are in degrees.
+    """
+
+    def words(after: State, index: int, value: float) -> str:
+        if index < first_angle:
+            return f"{names[index]} = {after.unit.text(value, 6, size=after.design.reach)}"
+        return f"{names[index]} = {format_number(value, 6, size=FULL_TURN)}°"
+
+    return words
 
 
-@action(_joint_words)
+@action(value_words(JOINTS, first_angle=6))
 def set_joint(state: State, joint: int, value: float) -> State:
     """Set one joint, by its index in `JOINTS`; where the lengths cannot close, keep the pose."""
     joints = with_value(state.joints, str(joint), value)
@@ -98,16 +108,7 @@ def set_position(state: State, axis: int, value: float) -> State:
     return move_to(state, Pose(position, state.pose.quaternion), state.yaw_pitch_roll)
 
 
-def angle_text(angle: float) -> str:
-    """Return an angle in degrees for the history."""
-    return f"{format_number(angle, 6, size=FULL_TURN)}°"
-
-
-def _angle_words(_: State, axis: int, value: float) -> str:
-    return f"{('yaw', 'pitch', 'roll')[axis]} = {angle_text(value)}"
-
-
-@action(_angle_words)
+@action(value_words(("yaw", "pitch", "roll")))
 def set_angle(state: State, axis: int, value: float) -> State:
     """Set yaw, pitch or roll, 0 to 2, in degrees; the point that the position is of stays."""
     angles = with_value(state.yaw_pitch_roll, str(axis), value)
@@ -133,13 +134,7 @@ def start_there(state: State, pose: Pose) -> State:
     return move_to(with_value(state, "view.workspace.start", "pose"), pose)
 
 
-def _fold_words(after: State, index: int, value: float) -> str:
-    if index > 0:
-        return f"{FOLDS[index]} = {angle_text(value)}"
-    return f"{FOLDS[0]} = {after.unit.text(value, 6, size=after.design.reach)}"
-
-
-@action(_fold_words)
+@action(value_words(FOLDS, first_angle=1))
 def set_fold(state: State, index: int, value: float) -> State:
     """Set one coordinate of the folds, by its index in `FOLDS`; the other five stay.
 

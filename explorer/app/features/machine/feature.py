@@ -16,7 +16,7 @@ from explorer.app.inputs.ranges import Span, platform_span
 from explorer.app.state.actions import Action, Set, action
 from explorer.app.state.frame import Frame
 from explorer.app.state.geometry import clear_machine
-from explorer.app.state.moves import angle_text
+from explorer.app.state.moves import value_words
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.markup import note
@@ -43,11 +43,7 @@ EVERY_LENGTH, BOTH_TILTS = "Every length (± mm)", "Both tilts (± °)"
 TILTS = "design.tolerances.guide_tilt_deg"
 
 
-def _tool_angle_words(_: State, axis: int, value: float) -> str:
-    return f"tool {ANGLES[axis][0]} = {angle_text(value)}"
-
-
-@action(_tool_angle_words)
+@action(value_words([f"tool {name}" for name, *_ in ANGLES]))
 def set_tool_angle(state: State, axis: int, value: float) -> State:
     """Set yaw, pitch or roll of the tool on the platform, 0 to 2, in degrees, which stay as set.
 

@@ -11,7 +11,7 @@ import numpy as np
 from explorer.app.session.feed import Feed, FeedOf, watch_of
 from explorer.app.state.actions import action
 from explorer.app.state.frame import Frame
-from explorer.app.state.moves import angle_text, move_to
+from explorer.app.state.moves import move_to, value_words
 from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.jobs.process import Channel
@@ -39,11 +39,7 @@ from explorer.workspace.workspace import Workspace
 ANGLES = ("azimuth", "tilt", "torsion")
 
 
-def _angle_words(_: State, axis: int, value: float) -> str:
-    return f"{ANGLES[axis]} = {angle_text(value)}"
-
-
-@action(_angle_words)
+@action(value_words(ANGLES))
 def set_tilt_torsion(state: State, axis: int, value: float) -> State:
     """Set azimuth, tilt or torsion, 0 to 2, in degrees."""
     return _tilt_to(state, state.tilt_torsion._replace(**{ANGLES[axis]: value}))
