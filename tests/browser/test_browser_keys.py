@@ -94,7 +94,7 @@ def test_ctrl_s_saves_and_ctrl_z_undoes_wherever_the_focus_is(data_tab: Tab) -> 
     for place in ("body", "input", "[role=slider]", "[role=tab]"):
         tab.page.locator(place).first.evaluate("e => e.focus()")
         tab.page.keyboard.press("ControlOrMeta+s")
-        tab.wait_for(lambda: saved.find("mine") == tab.state.design, f"saved from {place}")
+        tab.wait_for(lambda: saved.words_on(tab.state.design)[0] == "saved", f"saved from {place}")
         session.do(Set("pose", Pose((10.0, 5.0, 11.0), home.quaternion)))
         tab.settle()
         tab.page.locator(place).first.evaluate("e => e.focus()")
@@ -103,7 +103,7 @@ def test_ctrl_s_saves_and_ctrl_z_undoes_wherever_the_focus_is(data_tab: Tab) -> 
         saved.delete("mine")
         tab.settle()
     tab.page.keyboard.press("ControlOrMeta+z")
-    tab.wait_for(lambda: saved.find("mine") is not None, "brought back")
+    tab.wait_for(lambda: saved.words_on(tab.state.design)[0] == "saved", "brought back")
     assert (tab.client.camera.position == eye).all(), "S moves the camera"
 
 
