@@ -11,6 +11,12 @@ Vector = tuple[float, float, float]
 
 
 @helper
+def vector_of(values: FloatArray) -> Vector:
+    """Return an array (3,) as a vector."""
+    return (values[0], values[1], values[2])
+
+
+@helper
 def vector(points: FloatArray, index: int) -> Vector:
     """Return a row of an array (n, 3)."""
     return (points[index, 0], points[index, 1], points[index, 2])
@@ -23,7 +29,7 @@ def column(matrix: FloatArray, index: int) -> Vector:
 
 
 @helper
-def times(matrix: FloatArray, a: FloatArray) -> Vector:
+def times(matrix: FloatArray, a: FloatArray | Vector) -> Vector:
     """Return the product of a matrix (3, 3) and a vector (3,)."""
     return (
         matrix[0, 0] * a[0] + matrix[0, 1] * a[1] + matrix[0, 2] * a[2],
@@ -60,3 +66,9 @@ def cross3(a: Vector, b: Vector) -> Vector:
 def norm3(a: Vector) -> float:
     """Return the length of a vector."""
     return math.sqrt(dot3(a, a))
+
+
+@helper
+def along_axis(axis: int, size: float) -> Vector:
+    """Return a vector of a size along an axis."""
+    return (size if axis == 0 else 0.0, size if axis == 1 else 0.0, size if axis == 2 else 0.0)

@@ -22,8 +22,11 @@ from typing import NamedTuple
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
+from explorer.numerics.vectors import Vector, times, vector_of
 
 Angles = tuple[float, float]
+Terms = tuple[float, float, float, float, float, float, float, float, float, float]
+"""a, b and γ at φ, their derivatives by φ, and the sines and cosines of φ and σ."""
 
 # Numbers of initial boxes over half the torus, since (φ + π, σ + π) is the same pose.
 FIRST_PHI, FIRST_SIGMA = 6, 12
@@ -34,53 +37,23 @@ POLISH_STEPS = 60
 # Least improvement for which a box is divided, relative to the minimum and to the scatter.
 RELATIVE_GAIN, LEAST_GAIN = 1e-9, 1e-14
 EPSILON = 2.0**-52
+# 2 tr M: the unit of length is that of a scatter with a trace of one.
+TWICE_TRACE = 2.0
 
 
 class Constants(NamedTuple):
-    """The constants of f: m, l and the centroid g in base axes, c_y of the centroid, 2 tr M."""
+    """The constants of f: m, l and the centroid g in base axes, and c_y of the centroid."""
 
-    m_x: float
-    m_y: float
-    m_z: float
-    l_x: float
-    l_y: float
-    l_z: float
-    g_y: float
-    g_z: float
+    m: Vector
+    l: Vector  # noqa: E741 - the name in the formula
+    g: Vector
     c_y: float
-    twice_trace: float
-
-
-class Terms(NamedTuple):
-    """a, b and γ at φ, their derivatives by φ, and the sines and cosines of φ and σ."""
-
-    a: float
-    b: float
-    g: float
-    da: float
-    db: float
-    dg: float
-    sin_phi: float
-    cos_phi: float
-    sin_sigma: float
-    cos_sigma: float
 
 
 @helper
 def constants_at(r: FloatArray, g: FloatArray, scatter: FloatArray, c: FloatArray) -> Constants:
     """Return the constants of a rotation, a centroid in the base and the platform's moments."""
-    return Constants(
-        r[0, 0] * scatter[0, 0] + r[0, 1] * scatter[1, 0],
-        r[1, 0] * scatter[0, 0] + r[1, 1] * scatter[1, 0],
-        r[2, 0] * scatter[0, 0] + r[2, 1] * scatter[1, 0],
-        r[0, 0] * scatter[0, 1] + r[0, 1] * scatter[1, 1],
-        r[1, 0] * scatter[0, 1] + r[1, 1] * scatter[1, 1],
-        r[2, 0] * scatter[0, 1] + r[2, 1] * scatter[1, 1],
-        g[1],
-        g[2],
-        c[1],
-        2.0,
-    )
+    return Constants(times(r, scatter[:, 0]), times(r, scatter[:, 1]), vector_of(g), c[1])
 
 
 @helper
@@ -88,9 +61,9 @@ def terms_at(phi: float, sigma: float, k: Constants) -> Terms:
     """Return the terms of f at the angles φ of the plane and σ of the platform."""
     cp, sp, cs, ss = math.cos(phi), math.sin(phi), math.cos(sigma), math.sin(sigma)
     # n = (0, −sin φ, cos φ): at φ = 0 the plane is that of the base.
-    a, b, g = -sp * k.m_y + cp * k.m_z, -sp * k.l_y + cp * k.l_z, -sp * k.g_y + cp * k.g_z
-    da, db, dg = -cp * k.m_y - sp * k.m_z, -cp * k.l_y - sp * k.l_z, -cp * k.g_y - sp * k.g_z
-    return Terms(a, b, g, da, db, dg, sp, cp, ss, cs)
+    a, b, g = -sp * k.m[1] + cp * k.m[2], -sp * k.l[1] + cp * k.l[2], -sp * k.g[1] + cp * k.g[2]
+    da, db, dg = -cp * k.m[1] - sp * k.m[2], -cp * k.l[1] - sp * k.l[2], -cp * k.g[1] - sp * k.g[2]
+    return a, b, g, da, db, dg, sp, cp, ss, cs
 
 
 @helper
@@ -98,7 +71,7 @@ def value_at(phi: float, sigma: float, k: Constants) -> float:
     """Return f(φ, σ), the squared distance."""
     _, b, g, da, db, _, _, _, ss, cs = terms_at(phi, sigma, k)
     y = g - k.c_y * ss
-    return k.twice_trace - 2.0 * math.hypot(da + k.l_x * cs, k.m_x - db * cs) - 2.0 * b * ss + y * y
+    return TWICE_TRACE - 2.0 * math.hypot(da + k.l[0] * cs, k.m[0] - db * cs) - 2.0 * b * ss + y * y
 
 
 @helper
@@ -106,9 +79,9 @@ def bound_over(phi: float, sigma: float, alpha: float, beta: float, k: Constants
     """Return a lower bound of f within α of φ and β of σ."""
     a, b, g, da, db, dg, _, _, ss, cs = terms_at(phi, sigma, k)
     y = g - k.c_y * ss
-    w0, w1 = da + k.l_x * cs, k.m_x - db * cs
+    w0, w1 = da + k.l[0] * cs, k.m[0] - db * cs
     w0_phi, w1_phi = -a * alpha, b * cs * alpha
-    w0_sigma, w1_sigma = -k.l_x * ss * beta, db * ss * beta
+    w0_sigma, w1_sigma = -k.l[0] * ss * beta, db * ss * beta
     slope_phi = (-2.0 * db * ss + 2.0 * y * dg) * alpha
     slope_sigma = (-2.0 * b * cs - 2.0 * y * k.c_y * cs) * beta
     least = math.inf
@@ -118,15 +91,15 @@ def bound_over(phi: float, sigma: float, alpha: float, beta: float, k: Constants
         long = math.hypot(w0 + i * w0_phi + j * w0_sigma, w1 + i * w1_phi + j * w1_sigma)
         least = min(least, i * slope_phi + j * slope_sigma - 2.0 * long)
     # Second derivatives: of W, of b sin σ, and of γ − c_y sin σ.
-    size_a, size_b = math.hypot(k.m_y, k.m_z), math.hypot(k.l_y, k.l_z)
+    size_a, size_b = math.hypot(k.m[1], k.m[2]), math.hypot(k.l[1], k.l[2])
     second_w = (
         math.hypot(size_a, size_b) * alpha * alpha
         + 2.0 * size_b * alpha * beta
-        + math.hypot(k.l_x, size_b) * beta * beta
+        + math.hypot(k.l[0], size_b) * beta * beta
     )
     second_b = size_b * (alpha + beta) * (alpha + beta)
-    second_y = math.hypot(k.g_y, k.g_z) * alpha * alpha + abs(k.c_y) * beta * beta
-    return k.twice_trace - 2.0 * b * ss + y * y + least - second_w - second_b - abs(y) * second_y
+    second_y = math.hypot(k.g[1], k.g[2]) * alpha * alpha + abs(k.c_y) * beta * beta
+    return TWICE_TRACE - 2.0 * b * ss + y * y + least - second_w - second_b - abs(y) * second_y
 
 
 @helper
@@ -136,18 +109,18 @@ def polish(phi: float, sigma: float, k: Constants) -> Angles:
     for _ in range(POLISH_STEPS):
         a, b, g, da, db, dg, _, _, ss, cs = terms_at(phi, sigma, k)
         y = g - k.c_y * ss
-        w0, w1 = da + k.l_x * cs, k.m_x - db * cs
+        w0, w1 = da + k.l[0] * cs, k.m[0] - db * cs
         w = math.hypot(w0, w1)
         if w == 0.0:
             # On a ridge of f every direction descends.
             phi, sigma = phi + 1e-3, sigma + 1e-3
             value = value_at(phi, sigma, k)
             continue
-        p0, p1, s0, s1 = -a, b * cs, -k.l_x * ss, db * ss
+        p0, p1, s0, s1 = -a, b * cs, -k.l[0] * ss, db * ss
         along_p, along_s = (w0 * p0 + w1 * p1) / w, (w0 * s0 + w1 * s1) / w
         pp = (p0 * p0 + p1 * p1 - w0 * da + w1 * db * cs - along_p * along_p) / w
         ps = (p0 * s0 + p1 * s1 - w1 * b * ss - along_p * along_s) / w
-        square = s0 * s0 + s1 * s1 - w0 * k.l_x * cs + w1 * db * cs
+        square = s0 * s0 + s1 * s1 - w0 * k.l[0] * cs + w1 * db * cs
         sss = (square - along_s * along_s) / w
         y_sigma = -k.c_y * cs
         slope_p = -2.0 * along_p - 2.0 * db * ss + 2.0 * y * dg
@@ -169,7 +142,7 @@ def polish(phi: float, sigma: float, k: Constants) -> Angles:
         moved = value
         for _ in range(30):
             moved = value_at(phi + share * step_p, sigma + share * step_s, k)
-            if moved <= value + 8.0 * EPSILON * (abs(value) + k.twice_trace):
+            if moved <= value + 8.0 * EPSILON * (abs(value) + TWICE_TRACE):
                 break
             share *= 0.25
         phi, sigma = phi + share * step_p, sigma + share * step_s
@@ -200,9 +173,9 @@ def minimise_on_torus(k: Constants, boxes: FloatArray) -> tuple[float, float, fl
     best = value_at(phi, sigma, k)
     bound, first = math.inf, 0
     # Rates of the second-order terms: a box is halved along the angle whose term is larger.
-    size_b = math.hypot(k.l_y, k.l_z)
-    bend_phi = math.hypot(math.hypot(k.m_y, k.m_z), size_b) + k.g_y * k.g_y + k.g_z * k.g_z
-    bend_sigma = math.hypot(k.l_x, size_b) + k.c_y * k.c_y
+    size_b = math.hypot(k.l[1], k.l[2])
+    bend_phi = math.hypot(math.hypot(k.m[1], k.m[2]), size_b) + k.g[1] * k.g[1] + k.g[2] * k.g[2]
+    bend_sigma = math.hypot(k.l[0], size_b) + k.c_y * k.c_y
     # Large boxes precede small ones, so that the boxes left at the end have similar bounds.
     while first < last:
         p, s, alpha, beta = boxes[first]
@@ -214,7 +187,7 @@ def minimise_on_torus(k: Constants, boxes: FloatArray) -> tuple[float, float, fl
             value = value_at(p_down, s_down, k)
             if value < best:
                 best, phi, sigma = value, p_down, s_down
-        enough = best - RELATIVE_GAIN * abs(best) - LEAST_GAIN * k.twice_trace
+        enough = best - RELATIVE_GAIN * abs(best) - LEAST_GAIN * TWICE_TRACE
         if low >= enough or last + 2 > ROOM:
             bound = min(bound, low)
             continue
@@ -246,7 +219,7 @@ def write_on_plane(
     The centroid of the points is in the platform frame, g in the base frame, shape (3,) each.
     """
     _, _, _, da, db, _, sp, cp, ss, cs = terms_at(phi, sigma, k)
-    w0, w1 = da + k.l_x * cs, k.m_x - db * cs
+    w0, w1 = da + k.l[0] * cs, k.m[0] - db * cs
     w = math.hypot(w0, w1)
     if w > 0.0:
         w0, w1 = w0 / w, w1 / w

@@ -22,7 +22,7 @@ import numpy as np
 from explorer.legs.clearance import PAIRS, closest_shares, normal_rate
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.vectors import Vector, along, dot3, minus, norm3, vector
+from explorer.numerics.vectors import Vector, along, along_axis, dot3, minus, norm3, vector
 from explorer.workspace.limits.constraints import (
     ACROSS,
     BallOrCylinder,
@@ -138,16 +138,6 @@ def rate_along(leg: int, end: int, axis: int) -> float:
     return 1.0 if end == 1 or (axis == 0 and 0 < leg < 3) else 0.0
 
 
-@helper
-def unit_along(axis: int, size: float) -> Vector:
-    """Return a vector along an axis."""
-    return (
-        size if axis == 0 else 0.0,
-        size if axis == 1 else 0.0,
-        size if axis == 2 else 0.0,
-    )
-
-
 @kernel("void(b1[:,::1], i8[:,::1], f8[:,:,:,::1], f8[::1], f8[:,::1], f8[:,:,::1], f8[:,::1])")
 def raise_bounds(
     needed: BoolArray,
@@ -159,17 +149,14 @@ def raise_bounds(
     bounds: FloatArray,
 ) -> None:
     """Raise lower bounds of distances (n, 6), where needed, given the axes in the middles."""
-    ends, turns = np.empty((4, 3)), np.empty((3, 3))
+    turns = np.empty((3, 3))
     for row, pair in np.ndindex(needed.shape):
         if not needed[row, pair]:
             continue
         first, second = legs[pair, 0], legs[pair, 1]
-        for side in range(2):
-            for axis in range(3):
-                ends[side, axis] = axes[row, first, side, axis]
-                ends[2 + side, axis] = axes[row, second, side, axis]
-        a, b = vector(ends, 0), vector(ends, 2)
-        u, v, r = minus(vector(ends, 1), a), minus(vector(ends, 3), b), minus(a, b)
+        one, other = axes[row, first], axes[row, second]
+        a, b = vector(one, 0), vector(other, 0)
+        u, v, r = minus(vector(one, 1), a), minus(vector(other, 1), b), minus(a, b)
         s, t = closest_shares(u, v, r)
         apart = minus(along(r, s, u), along((0.0, 0.0, 0.0), t, v))
         distance = norm3(apart)
@@ -179,22 +166,22 @@ def raise_bounds(
         # n turns with the legs, at these rates by the position.
         turned = 0.0
         for axis in range(3):
-            du = unit_along(axis, 1.0 - rate_along(first, 0, axis))
-            dv = unit_along(axis, 1.0 - rate_along(second, 0, axis))
+            du = along_axis(axis, 1.0 - rate_along(first, 0, axis))
+            dv = along_axis(axis, 1.0 - rate_along(second, 0, axis))
             turn = normal_rate(n, u, du, v, dv, s, t)
             turns[axis, 0], turns[axis, 1], turns[axis, 2] = turn
             turned += norm3(turn) * half[axis]
         least = np.inf
         for i in range(2):
             for j in range(2):
-                w = minus(vector(ends, i), vector(ends, 2 + j))
+                w = minus(vector(one, i), vector(other, j))
                 value, slope = dot3(n, w), (0.0, 0.0, 0.0)
                 for axis in range(3):
                     rate = rate_along(first, i, axis) - rate_along(second, j, axis)
                     change = n[axis] * rate + dot3(vector(turns, axis), w)
-                    slope = along(slope, 1.0, unit_along(axis, change))
-                    for other in range(3):
-                        value -= abs(turns[other, axis] * rate) * half[axis] * half[other]
+                    slope = along(slope, 1.0, along_axis(axis, change))
+                    for k in range(3):
+                        value -= abs(turns[k, axis] * rate) * half[axis] * half[k]
                 own = least_in_workspace(value, slope, half, slack[row], slack_slopes[row])
                 least = min(least, own)
         # The direction is at right angles to its turns.

@@ -16,8 +16,9 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.pose import rotation_array
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.workspace.limits.constraints import Cone, Constraint, constraints, slacks
+from explorer.workspace.limits.constraints import Cone, Constraint, slacks, solids_of
 from explorer.workspace.limits.region import Region, region_of
+from explorer.workspace.limits.table import demands_of
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 
@@ -57,7 +58,8 @@ class Workspace:
     @cached_property
     def limits(self) -> tuple[Constraint, ...]:
         """The limits as solids of positions, in the order of the design file."""
-        return constraints(self.design, self.rotation, self.signs)
+        demands = demands_of(self.design, self.signs)
+        return tuple(s for each in demands for s in solids_of(self.design, self.rotation, each))
 
     @cached_property
     def region(self) -> Region:

@@ -19,7 +19,7 @@ from explorer.numerics.computed_once import computed_once
 from explorer.numerics.roots import find_roots
 from explorer.workspace.faces.surfaces import Smooth, Surfaces, pattern
 from explorer.workspace.limits.constraints import Constraint, Never
-from explorer.workspace.limits.region import box_of, contract_box
+from explorer.workspace.limits.region import contract_box, region_of
 from explorer.workspace.solids.facets import Box
 from explorer.workspace.workspace import Workspace
 
@@ -126,7 +126,7 @@ def faces_within(limits: Sequence[Constraint]) -> Faces:
     smooth = [limit for limit in limits if not isinstance(limit, Never)]
     surfaces = Surfaces(smooth)
     names = tuple(limit.name for limit in smooth)
-    box = box_of(limits)
+    box = region_of(limits).box
     ends = None if box is None else contract_box(limits, *box)
     if ends is None:
         return _finish(NOTHING, surfaces, names, 1.0)

@@ -21,7 +21,6 @@ from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, position_array
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.quantities import Bound, Demand, LegAngle
-from explorer.workspace.limits.table import demands_of
 
 YAW = "yaw"
 """The name of the platform's rotation about the base's z-axis, in radians, as a parameter."""
@@ -163,17 +162,6 @@ def shift(limit: Constraint, offset: FloatArray) -> Constraint:
             return limit
 
 
-def constraints(
-    design: Design, rotation: FloatArray, signs: tuple[int, int, int] | None
-) -> tuple[Constraint, ...]:
-    """Return the limits of a design at an orientation (3, 3), in the order of the design file.
-
-    A sign triple may be demanded instead of the home's, even if no margin is demanded.
-    """
-    demands = demands_of(design, signs)
-    return tuple(solid for demand in demands for solid in _solids(design, rotation, demand))
-
-
 def surface_of(
     limit: BallOrCylinder | HalfSpace | Cone,
 ) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
@@ -209,8 +197,8 @@ def angle_between(vector: FloatArray, axis: FloatArray) -> FloatArray:
     return np.asarray(np.arctan2(across, vector @ axis))
 
 
-def _solids(design: Design, r: FloatArray, demand: Demand) -> Iterator[Constraint]:
-    """Yield the solids of a demand: its quantity is of one of four forms at a rotation."""
+def solids_of(design: Design, r: FloatArray, demand: Demand) -> Iterator[Constraint]:
+    """Yield the solids of a demand at a rotation (3, 3): its quantity is of one of four forms."""
     kind = demand.quantity
     if kind <= quantities.D3:
         yield from _half_spaces(demand, *line_of(design, r, kind))

@@ -19,7 +19,7 @@ from explorer.mechanism.margins import margins_at
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.number_text import Unit, format_number
-from explorer.numerics.vectors import cross3, dot3, minus, norm3, vector
+from explorer.numerics.vectors import along, cross3, dot3, minus, norm3, times, vector, vector_of
 
 # Quantities, those first that take the least time: b4, the margins, the carriages, their distance,
 # d3 − d1, the lengths in the order of the legs, and the angle in radians of a leg from an axis.
@@ -78,10 +78,10 @@ def angle_at(
     if axis == (0.0, 0.0, 0.0):
         return math.pi
     if demands[index, TURNS] > 0.0:
-        axis = (dot3(vector(r, 0), axis), dot3(vector(r, 1), axis), dot3(vector(r, 2), axis))
+        axis = times(r, axis)
     leg = int(demands[index, LEG])
-    along = minus(vector(ends, leg), vector(base, leg))
-    return math.atan2(norm3(cross3(along, axis)), dot3(along, axis))
+    own = minus(vector(ends, leg), vector(base, leg))
+    return math.atan2(norm3(cross3(own, axis)), dot3(own, axis))
 
 
 @helper
@@ -100,15 +100,12 @@ def write_speeds(
     The point of the platform that moves straight is `tool`, in platform coordinates; it starts at
     p and moves by `step`. The lengths and the carriages have the speed of the leg's platform end.
     """
-    forward = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+    forward = norm3(vector_of(step))
     ends = ((row[B1], row[B1 + 1]), (row[B2], 0.0), (row[B3], 0.0), (0.0, 0.0))
     swing = 0.0
     for leg in range(4):
-        u, v, w = ends[leg][0] - tool[0], ends[leg][1] - tool[1], -tool[2]
-        x = u * r[0, 0] + v * r[0, 1] + w * r[0, 2]
-        y = u * r[1, 0] + v * r[1, 1] + w * r[1, 2]
-        z = u * r[2, 0] + v * r[2, 1] + w * r[2, 2]
-        swing = angle * norm3(cross3((axis[0], axis[1], axis[2]), (x, y, z)))
+        arm = times(r, (ends[leg][0] - tool[0], ends[leg][1] - tool[1], -tool[2]))
+        swing = angle * norm3(cross3(vector_of(axis), arm))
         speeds[L1 + leg] = forward + swing
     speeds[D1], speeds[D3] = speeds[D2], speeds[D4]
     speeds[GAP] = speeds[ORDER] = angle * abs(row[B3] - row[B2])
@@ -118,12 +115,8 @@ def write_speeds(
         share = math.sqrt(max(0.0, 1.0 - axis[i] * axis[i]))
         speeds[X + i] = abs(step[i]) + swing * share
     # On its line the tool is farthest from a1 at one of the ends.
-    farthest = 0.0
-    for end in range(2):
-        square = 0.0
-        for i in range(3):
-            square += (p[i] + end * step[i]) ** 2
-        farthest = max(farthest, math.sqrt(square))
+    start = vector_of(p)
+    farthest = max(norm3(start), norm3(along(start, 1.0, vector_of(step))))
     # With c the position of the tool, δ1 = tool z − R ẑ·c and δ2 = (x̂ × R x̂)·c − x̂·R (x̂ × tool).
     speeds[DELTA1] = forward + angle * farthest
     speeds[DELTA2] = speeds[DELTA1] + angle * math.hypot(tool[1], tool[2])
@@ -132,7 +125,7 @@ def write_speeds(
     square = angle * angle
     speeds[BENDS] = square * farthest + 2.0 * angle * forward
     speeds[BENDS + 1] = speeds[BENDS] + square * math.hypot(tool[1], tool[2])
-    speeds[BENDS + 2] = square * math.sqrt(tool[0] ** 2 + tool[1] ** 2 + tool[2] ** 2)
+    speeds[BENDS + 2] = square * norm3(vector_of(tool))
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1])")

@@ -89,11 +89,6 @@ class Region:
         return None if self.is_flat or not (lows < highs).all() else (lows, highs)
 
 
-def box_of(limits: Sequence[Constraint]) -> tuple[FloatArray, FloatArray] | None:
-    """Return `Region.box` of the region that satisfies all limits."""
-    return region_of(limits).box
-
-
 def region_of(limits: Sequence[Constraint]) -> Region:
     """Return the region that satisfies all limits; at least one must be the inside of a ball."""
     balls = [c for c in limits if isinstance(c, BallOrCylinder)]

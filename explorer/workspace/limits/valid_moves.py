@@ -22,7 +22,17 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.vectors import Vector, column, cross3, dot3, minus, vector
+from explorer.numerics.vectors import (
+    Vector,
+    along,
+    column,
+    cross3,
+    dot3,
+    minus,
+    norm3,
+    vector,
+    vector_of,
+)
 from explorer.workspace.limits.quantities import (
     A3,
     ANGLE,
@@ -113,19 +123,9 @@ class MoveCheck(NamedTuple):
 @helper
 def make_check(row: FloatArray, demands: FloatArray, tool: FloatArray) -> MoveCheck:
     """Return a check of moves."""
-    return MoveCheck(
-        row,
-        demands,
-        tool,
-        np.zeros((4, 3)),
-        np.zeros((4, 3)),
-        np.zeros(3),
-        np.zeros((3, 3)),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(SPEEDS),
-    )
+    base, ends, r, v = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros((3, 3)), np.zeros((4, 3))
+    speeds = np.zeros(SPEEDS)
+    return MoveCheck(row, demands, tool, base, ends, v[0], r, v[1], v[2], v[3], speeds)
 
 
 @helper
@@ -241,12 +241,6 @@ def safe_share_of_clearances(check: MoveCheck, least: float) -> float:
 
 
 @helper
-def vector_of(values: FloatArray) -> Vector:
-    """Return an array (3,) as a vector."""
-    return (values[0], values[1], values[2])
-
-
-@helper
 def write_turn(r: FloatArray, s: FloatArray, axis: FloatArray) -> float:
     """Write the unit axis, in the base frame, that turns r into s; return the angle in radians."""
     turn = np.empty((3, 3))
@@ -256,7 +250,7 @@ def write_turn(r: FloatArray, s: FloatArray, axis: FloatArray) -> float:
     across = (turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
     axis[0], axis[1], axis[2] = across
     cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
-    angle = math.atan2(0.5 * math.sqrt(dot3(across, across)), cosine)
+    angle = math.atan2(0.5 * norm3(across), cosine)
     if cosine < -0.5:
         # Near half a turn the longest column of the symmetric part gives the axis best.
         best = 0
@@ -269,7 +263,7 @@ def write_turn(r: FloatArray, s: FloatArray, axis: FloatArray) -> float:
         if dot3(vector_of(axis), across) < 0.0:
             for k in range(3):
                 axis[k] = -axis[k]
-    length = math.sqrt(dot3(vector_of(axis), vector_of(axis)))
+    length = norm3(vector_of(axis))
     if length == 0.0:
         axis[0] = 1.0
         return 0.0
@@ -297,14 +291,9 @@ def rates_of_margins(check: MoveCheck, t: float, angle: float) -> Vector:
     """Return the rates of the margins in the pose at a share t of a move, per share of it."""
     place, axis = vector_of(check.p), vector_of(check.axis)
     # b4 turns about the tool, which goes straight.
-    tool = (
-        check.first[0] + t * check.step[0],
-        check.first[1] + t * check.step[1],
-        check.first[2] + t * check.step[2],
-    )
+    step, u, n = vector_of(check.step), column(check.r, 0), column(check.r, 2)
     turn = (angle * axis[0], angle * axis[1], angle * axis[2])
-    swing, u, n = cross3(turn, minus(place, tool)), column(check.r, 0), column(check.r, 2)
-    pace = (check.step[0] + swing[0], check.step[1] + swing[1], check.step[2] + swing[2])
+    pace = along(step, 1.0, cross3(turn, minus(place, along(vector_of(check.first), t, step))))
     going, turning = margins_of(pace, u, n), margins_of(place, cross3(turn, u), cross3(turn, n))
     return (going[0] + turning[0], going[1] + turning[1], going[2])
 

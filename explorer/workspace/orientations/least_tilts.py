@@ -8,7 +8,7 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.vectors import Vector
+from explorer.numerics.vectors import Vector, along_axis
 from explorer.workspace.limits.quantities import A3, D1, HIGH, L1, LOW, QUANTITY, X
 from explorer.workspace.orientations.turns import NO_LIMIT, SCRATCH, TurnSearch, arm_of, first_limit
 
@@ -79,17 +79,17 @@ def lowest_about(
 
 
 @helper
-def azimuth_towards(v: Vector, wx: float, wy: float, wz: float) -> float:
+def azimuth_towards(v: Vector, w: Vector) -> float:
     """Return the azimuth of the tilt that takes a vector v to a vector w as long.
 
     The axis of a tilt is horizontal and keeps what v has along it, so it is perpendicular to the
     horizontal part of the difference of v and w.
     """
-    x, y = v[0] - wx, v[1] - wy
+    x, y = v[0] - w[0], v[1] - w[1]
     # The tilt is less than half a turn, from the axis z towards its azimuth.
-    rise = wz
+    rise = w[2]
     if v[2] != 0.0:
-        rise = wz * (x * v[0] + y * v[1]) - v[2] * (x * wx + y * wy)
+        rise = w[2] * (x * v[0] + y * v[1]) - v[2] * (x * w[0] + y * w[1])
     sign = -1.0 if rise > 0.0 else 1.0
     return math.atan2(sign * y, sign * x)
 
@@ -131,25 +131,25 @@ def write_worst_azimuths(search: TurnSearch, torsion: float, worst: FloatArray) 
         far = math.hypot(y, z) if on_guide else math.sqrt(x * x + y * y + z * z)
         if far > 0.0 and far + arm > longest:
             share = arm / far
-            worst[count] = azimuth_towards(v, share * x, share * y, share * z)
+            worst[count] = azimuth_towards(v, (share * x, share * y, share * z))
             count += 1
         if on_guide and arm > far and shortest > 0.0:
             # The leg's end can lie on the guide, at one of two places.
             along = math.sqrt(arm * arm - far * far)
-            worst[count] = azimuth_towards(v, along, -p[1], -p[2])
-            worst[count + 1] = azimuth_towards(v, -along, -p[1], -p[2])
+            worst[count] = azimuth_towards(v, (along, -p[1], -p[2]))
+            worst[count + 1] = azimuth_towards(v, (-along, -p[1], -p[2]))
             count += 2
         elif far > 0.0 and abs(far - arm) < shortest:
             share = -arm / far
-            worst[count] = azimuth_towards(v, share * x, share * y, share * z)
+            worst[count] = azimuth_towards(v, (share * x, share * y, share * z))
             count += 1
         if on_guide:
             least, most = bounds_of(demands, D1 + leg - 1)
             if p[0] + arm > most:
-                worst[count] = azimuth_towards(v, arm, 0.0, 0.0)
+                worst[count] = azimuth_towards(v, (arm, 0.0, 0.0))
                 count += 1
             if p[0] - arm < least:
-                worst[count] = azimuth_towards(v, -arm, 0.0, 0.0)
+                worst[count] = azimuth_towards(v, (-arm, 0.0, 0.0))
                 count += 1
         if leg < 3:
             continue
@@ -158,10 +158,7 @@ def write_worst_azimuths(search: TurnSearch, torsion: float, worst: FloatArray) 
             for sign in (-1.0, 1.0):
                 bound = most if sign > 0.0 else -least
                 if sign * p[i] + arm > bound:
-                    end = sign * arm
-                    worst[count] = azimuth_towards(
-                        v, end if i == 0 else 0.0, end if i == 1 else 0.0, end if i == 2 else 0.0
-                    )
+                    worst[count] = azimuth_towards(v, along_axis(i, sign * arm))
                     count += 1
     return count
 

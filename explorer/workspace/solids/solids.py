@@ -29,7 +29,7 @@ from explorer.workspace.limits.constraints import (
     HalfSpace,
     shift,
 )
-from explorer.workspace.limits.region import box_of, contract_box, region_of
+from explorer.workspace.limits.region import contract_box, region_of
 from explorer.workspace.slices.volume import (
     emptying_limits,
     find_emptying_limits,
@@ -271,7 +271,7 @@ def _frame_of(
     """
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
         raise InputError(f"the tolerance must be positive; got {tolerance:g}")
-    boxes = [box for box in map(box_of, families) if box is not None]
+    boxes = [box for limits in families if (box := region_of(limits).box) is not None]
     # If all workspaces are empty, any frame will do.
     lows = np.min([low for low, _ in boxes], axis=0) if boxes else np.zeros(3)
     highs = np.max([high for _, high in boxes], axis=0) if boxes else np.full(3, reach)
