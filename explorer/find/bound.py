@@ -48,7 +48,12 @@ def least_longest_mm(requirement: Requirement) -> float:
 
     It is infinite if no swing as small as the required one allows the tilt.
     """
-    if not _swings_enough(requirement):
+    # Some axis parallel to the base plane is square to leg 4 at home. Seen from the platform, a
+    # tilt about it turns the direction at home by the whole angle. With the tool at b4 the leg has
+    # that direction in the centre of the box at every tilt, so that b4 swings as much, and more in
+    # other positions. With another tool the swings at a3 and b4 share it.
+    share, swing = 0.5 if "tool" in requirement.free else 1.0, requirement.swing_deg
+    if swing is not None and swing <= share * requirement.tilt_deg:
         return math.inf
     terms = Terms.of(requirement)
     leg, size, done = _Leg4(terms), 0.5 * math.pi / FIRST, 0
@@ -149,7 +154,10 @@ class _Leg4:
         misses |= 2.0 * shortest - longest < self.dead * box
         if terms.swing < math.pi:
             corners = toward[:, :1] + box[:, None, None] * self.corners
-            length, moved = lengths_of(corners), _moved(size) * box[:, None]
+            # A direction comes to the middle of its cell by a turn about the axis square to it, and
+            # one about the normal of the base plane, each by at most half an edge of the cell.
+            moved = math.sqrt(1.0 - math.cos(0.25 * size) ** 4) * box[:, None]
+            length = lengths_of(corners)
             # With the direction, an axis turns by less than its distance from the square one.
             apart = np.array([0.0, *np.abs(np.sin(self.angles))]) * math.sin(0.25 * size)
             swing = terms.swing + 4.0 * np.arcsin(math.sin(0.5 * self.tilt) * apart)
@@ -189,28 +197,6 @@ def _vectors(directions: FloatArray) -> FloatArray:
     lean, azimuth = directions[..., 0], directions[..., 1]
     flat = np.sin(lean)
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(lean)], axis=-1)
-
-
-def _moved(size: float) -> float:
-    """Return how far a corner moves by the turn that brings a direction of a cell to its middle.
-
-    It is a turn about the axis square to the direction, and one about the normal of the base plane,
-    each by at most half an edge of the cell.
-    """
-    return math.sqrt(1.0 - math.cos(0.25 * size) ** 4)
-
-
-def _swings_enough(requirement: Requirement) -> bool:
-    """Return whether leg 4 can swing in its joints as a tilt asks for.
-
-    Some axis parallel to the base plane is square to the leg at home. Seen from the platform, a
-    tilt about it turns the direction at home by the whole angle. With the tool at b4 the leg has
-    that direction in the centre of the box at every tilt, so that b4 swings as much, and more in
-    other positions. With another tool the swings at a3 and b4 share it.
-    """
-    share = 0.5 if "tool" in requirement.free else 1.0
-    swing = requirement.swing_deg
-    return swing is None or swing > share * requirement.tilt_deg
 
 
 def impossible_demands(requirement: Requirement) -> tuple[str, ...]:

@@ -6,14 +6,13 @@ Where a demand is missed, the poses that miss it are told, so that a search can 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from explorer.find import machine_values as m
 from explorer.find.candidates import standard_poses
-from explorer.find.demands import Demand, demands_of, limits_of
+from explorer.find.demands import demands_of, limits_of
 from explorer.find.over_poses import look_at, prove_demand, sample_demand
 from explorer.find.over_tilts import prove_limits
 from explorer.find.terms import Terms
@@ -126,7 +125,11 @@ def certify(
             over = np.concatenate([np.maximum(ratio, own[:, 1] / terms.longest - 1.0), ratio])
             found.values[:8] = np.maximum(found.values[:8], over)
             found.bounds[:8] = np.maximum(found.bounds[:8], over)
-        parts, skips = _parts(found, limits), is_quick and found.values.max() > TOLERANCE
+        # The lengths, and each of the limits.
+        ends = np.cumsum([8, *(len(each.items) for each in limits)])[:-1]
+        columns = [np.split(each, ends) for each in found]
+        parts = [CellValues(*part) for part in zip(*columns, strict=True)]
+        skips = is_quick and found.values.max() > TOLERANCE
         at = terms.values(x, poses)
         for demand in demands:
             part = look_at(demand, at)
@@ -147,13 +150,6 @@ def certify(
     every = [(each.name, item) for each in (*limits, *demands) for item in each.items]
     names, items = zip(*lengths, *every, strict=True)
     return Certificate(names, items, own, found.values, found.places, found.bounds <= TOLERANCE)
-
-
-def _parts(found: CellValues, limits: Sequence[Demand]) -> list[CellValues]:
-    """Return the values of lengths and of each of the limits."""
-    ends = np.cumsum([8, *(len(each.items) for each in limits)])[:-1]
-    columns = [np.split(each, ends) for each in found]
-    return [CellValues(*part) for part in zip(*columns, strict=True)]
 
 
 def is_regular(x: FloatArray) -> bool:

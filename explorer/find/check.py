@@ -117,32 +117,22 @@ class _Check:
         ends = np.array([self.design.length_range(name) for name in LENGTHS])
         limits = self.design.unit_mm * ends.T[::-1].ravel()
         proven = bool(found.proven[:8].all())
-        row = int(((used - limits) * np.repeat([1.0, -1.0], 4)).argmax())
-        yield self._row(LENGTH, row, used, limits[row], "mm", proven, is_least=row >= 4)
+        yield self._worst(LENGTH, used, limits, "mm", proven)
         if math.isfinite(terms.ratio):
             is_bought = bool((own[:, 1] <= terms.ratio * (1.0 + 1e-5) * own[:, 0]).all())
-            ratios = used[:4] / used[4:]
-            row = int(ratios.argmax())
-            yield self._row("ratio", row, ratios, terms.ratio, "", proven and is_bought)
+            limits = np.full(4, terms.ratio)
+            yield self._worst("ratio", used[:4] / used[4:], limits, "", proven and is_bought)
         longest = terms.requirement.legs.longest_mm
         if longest is not None:
-            row = int(used[:4].argmax())
-            yield self._row("longest leg", row, used, longest, "mm", proven)
+            yield self._worst("longest leg", used[:4], np.full(4, longest), "mm", proven)
 
-    def _row(
-        self,
-        name: str,
-        row: int,
-        values: FloatArray,
-        limit: float,
-        unit: str,
-        proven: bool,
-        *,
-        is_least: bool = False,
+    def _worst(
+        self, name: str, values: FloatArray, limits: FloatArray, unit: str, proven: bool
     ) -> DemandCheck:
-        """Return the check of the length or ratio in a row, which is the worst."""
-        worst, limit = float(values[row]), float(limit)
-        spare = worst - limit if is_least else limit - worst
+        """Return the check of the worst of four longest lengths, or ratios, and four shortest."""
+        spares = (limits - values) * np.repeat([1.0, -1.0], 4)[: len(values)]
+        row = int(spares.argmin())
+        worst, limit, spare = (float(each[row]) for each in (values, limits, spares))
         item = self.found.items[row] if name == LENGTH else LENGTHS[row]
         kept, pose = spare >= -KEPT * limit, self._pose(self.found.poses[row])
         return DemandCheck(name, item, kept, worst, limit, spare, unit, pose, kept and proven)
@@ -217,6 +207,7 @@ class _Check:
 
     def _pose(self, pose: FloatArray) -> Pose:
         """Return the pose of b4 in design units at a pose over the box."""
-        tool, rotation = self.terms.tool_at(self.x, pose[None])
-        offset = tool_offset(rotation[0], self.design.tool.position)
-        return Pose.of(tool[0] / self.design.unit_mm - offset, rotation[0])
+        at, scale = self.terms.values(self.x, pose[None]), self.terms.scale_mm
+        rotation = np.column_stack([m.rows_of(axis)[0] for axis in (at.u, at.v, at.w)])
+        offset = tool_offset(rotation, self.design.tool.position)
+        return Pose.of(scale * m.rows_of(at.tool)[0] / self.design.unit_mm - offset, rotation)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from functools import reduce
+from functools import partial, reduce
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -144,15 +145,11 @@ def every_demand(terms: Terms) -> list[Demand]:
 
 def clearances_of(terms: Terms) -> Iterator[Demand]:
     """Yield the demand on the distances of the legs, if there is one."""
-
-    def distances(at: MachineValues) -> list[Any]:
-        return at.distances
-
     if terms.distance > 0.0:
         yield Demand(
             "clearance",
             tuple(f"legs {pair_name(pair)}" for pair in PAIRS),
-            distances,
+            attrgetter("distances"),
             terms.distance,
             "mm",
             terms.scale_mm,
@@ -165,20 +162,12 @@ def clearances_of(terms: Terms) -> Iterator[Demand]:
 def _of_actuators(terms: Terms) -> Iterator[Demand]:
     """Yield the demands on what the actuators do, over their limits."""
     need, legs, payload = terms.requirement, terms.requirement.legs, terms.requirement.payload
-    weight = payload.mass_kg * STANDARD_GRAVITY * np.array(need.gravity)
-    centre, force = np.array(payload.centre_mm) / terms.scale_mm, payload.force_n
+    weight = tuple(payload.mass_kg * STANDARD_GRAVITY * np.array(need.gravity))
+    centre, force = tuple(np.array(payload.centre_mm) / terms.scale_mm), payload.force_n
+    demand = partial(Demand, limit=1.0, reserve=STEEP, is_singular=True)
 
     def held(at: MachineValues) -> list[Any]:
-        return at.weight_forces(tuple(weight), tuple(centre))
-
-    def demand(
-        name: str,
-        items: tuple[str, ...],
-        values: Callable[[MachineValues], list[Any]],
-        limit: float,
-        unit: str,
-    ) -> Demand:
-        return Demand(name, items, values, 1.0, unit, limit, reserve=STEEP, is_singular=True)
+        return at.forces(weight, m.cross(at.of_platform(centre), weight))
 
     if (legs.push_n or legs.pull_n) and (payload.mass_kg or force):
         push = legs.push_n or math.inf
@@ -192,7 +181,7 @@ def _of_actuators(terms: Terms) -> Iterator[Demand]:
                 for own, gain in zip(held(at), at.tool_speeds, strict=True)
             ]
 
-        yield demand("force", JOINTS, forces, min(push, pull), "N")
+        yield demand("force", JOINTS, forces, unit="N", factor=min(push, pull))
     speed, turning = need.tool.speed_mm_s, math.radians(need.tool.turning_deg_s) * terms.scale_mm
     if (fastest := legs.speed_mm_s) is not None and (speed or turning):
 
@@ -205,20 +194,16 @@ def _of_actuators(terms: Terms) -> Iterator[Demand]:
                 found.append((speed + turning * lever) / fastest)
             return found
 
-        yield demand("speed", JOINTS, speeds, fastest, "mm/s")._replace(is_singular=False)
+        yield demand("speed", JOINTS, speeds, unit="mm/s", factor=fastest, is_singular=False)
     if (least := need.transmission) is not None:
-
-        def transmissions(at: MachineValues) -> list[Any]:
-            return at.transmissions
-
-        index = demand("transmission index", JOINTS, transmissions, 1.0, "")
-        yield index._replace(limit=least, is_least=True, reserve=STEEP * least)
+        index = Demand("transmission index", JOINTS, attrgetter("transmissions"), least, "", 1.0)
+        yield index._replace(is_least=True, reserve=STEEP * least, is_singular=True)
     if (most_error := need.error_mm) is not None:
 
         def error(at: MachineValues) -> list[Any]:
             return [legs.error_mm / most_error * largest_error(at)]
 
-        yield demand("error", ("",), error, most_error, "mm")
+        yield demand("error", ("",), error, unit="mm", factor=most_error)
     if (most_bend := need.deflection_mm) is not None:
         compliance = 1.0 / (legs.stiffness_n_mm or math.inf)
 
@@ -229,7 +214,7 @@ def _of_actuators(terms: Terms) -> Iterator[Demand]:
             ]
             return [compliance / most_bend * sum(bends)]
 
-        yield demand("deflection", ("",), deflection, most_bend, "mm")
+        yield demand("deflection", ("",), deflection, unit="mm", factor=most_bend)
 
 
 def largest_error(at: MachineValues) -> Any:

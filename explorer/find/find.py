@@ -195,16 +195,17 @@ class Search:
         moved[free] += random.choice(CHANGES) * random.normal(size=len(free))
         return moved
 
-    def improve(self, x: FloatArray, kind: str) -> Machine | None:
-        """Return the machine after an improvement, certified; None if it misses a demand."""
-        poses = standard_poses(self.terms.tilt)
-        ranges = lengths_over(x, self.terms, poses)
-        first = certify(x, self.terms, ranges=ranges, is_quick=True, cells=64)
-        return self._improve(x, kind, first, poses)
+    def improve(self, x: FloatArray, kind: str, known: Machine | None = None) -> Machine | None:
+        """Return the machine after an improvement, certified; None if it misses a demand.
 
-    def _improve(
-        self, x: FloatArray, kind: str, found: Certificate, poses: FloatArray
-    ) -> Machine | None:
+        It goes on with the certificate and the poses of a machine if one is known.
+        """
+        if known is None:
+            poses = standard_poses(self.terms.tilt)
+            ranges = lengths_over(x, self.terms, poses)
+            found = certify(x, self.terms, ranges=ranges, is_quick=True, cells=64)
+        else:
+            found, poses = known.certificate, known.poses
         azimuths = np.linspace(-math.pi, math.pi, AZIMUTHS + 1)[1:]
         tilts = np.array([(0.0, 0.0), *((each, self.terms.tilt) for each in azimuths)])
         for _ in range(ROUNDS):
@@ -215,9 +216,9 @@ class Search:
             search = Improvement(self.terms, kind, x, lambda: self.spend(EVALUATION_UNITS), spare)
             improved = search.run(poses)
             x = improved.x
-            known = self.best.get(kind)
+            best = self.best.get(kind)
             # What further poses demand does not lower the cost.
-            is_worse = known is not None and improved.cost >= known.cost
+            is_worse = best is not None and improved.cost >= best.cost
             if is_worse or improved.missed > NEARLY or not is_regular(x):
                 return None
             self.spend(CERTIFICATE_UNITS)
@@ -244,12 +245,12 @@ class Search:
         for kind in list(self.best):
             last: Machine | None = self.best.pop(kind)
             while last is not None:
-                certificate = certify(last.x, self.terms)
-                if certificate.is_kept:
-                    self.best[kind] = replace(last, certificate=certificate)
+                last = replace(last, certificate=certify(last.x, self.terms))
+                if last.certificate.is_kept:
+                    self.best[kind] = last
                     break
                 try:
-                    last = self._improve(last.x, kind, certificate, last.poses)
+                    last = self.improve(last.x, kind, last)
                 except Stop:
                     last = None
 
@@ -299,7 +300,7 @@ def find_designs(
     start = None if design is None else row_of(design, terms)
     ends = time.perf_counter() + PATIENCE * seconds
     units = UNITS_PER_SECOND * seconds
-    search = Search(terms, kinds, units, ends, stop or _never, seed)
+    search = Search(terms, kinds, units, ends, stop or (lambda: False), seed)
 
     def so_far() -> FoundDesigns:
         found = [search.best[kind] for kind in search.kinds if kind in search.best]
@@ -311,10 +312,6 @@ def find_designs(
     search.finish()
     found, status = so_far(), "cancelled" if search.is_cancelled else "none"
     return found if found.designs else replace(found, status=status)
-
-
-def _never() -> bool:
-    return False
 
 
 def _answer(found: Machine, terms: Terms, base: Design | None) -> FoundDesign:

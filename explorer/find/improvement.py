@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -86,15 +86,8 @@ GROWING = MappingProxyType({"tilt_deg": m.TILT, "box_mm": m.SIZE})
 BESIDE = 0.02
 
 
-@dataclass(frozen=True)
-class Improved:
-    """A machine after an improvement.
-
-    Attributes:
-        x: The machine, shape (18,).
-        missed: The largest amount by which a demand is missed at the poses; 0 if all are kept.
-        cost: Logarithm of the product that the preference makes least.
-    """
+class Improved(NamedTuple):
+    """A machine (18,), the most by which it misses a demand at the poses, and its cost."""
 
     x: FloatArray
     missed: float
@@ -283,7 +276,9 @@ class Improvement:
             missed = max(0.0, -float(self.table(x[None], looked, bounds[None])[0].min()))
             start, ends = np.append(y, missed), np.append(ends, [[0.0, 2.0 * missed + 1.0]], axis=0)
             equal = np.zeros(len(rows), dtype=bool)
-            found = slsqp(evaluate, _ignore, start, ends, equal, most=STEPS, precision=PRECISION)
+            found = slsqp(
+                evaluate, lambda _: None, start, ends, equal, most=STEPS, precision=PRECISION
+            )
         y = found[:-1] if np.isfinite(found).all() else y
         moved = x.copy()
         moved[free] = y[:n]
@@ -303,9 +298,7 @@ class Improvement:
         """Return the largest amount by which a demand is missed in poses; 0 if none is."""
         with np.errstate(all="ignore"):
             least = float(np.min(self.table(x[None], poses, bounds[None])))
-        if not math.isfinite(least):
-            return math.inf
-        return max(0.0, -least)
+        return max(0.0, -least) if math.isfinite(least) else math.inf
 
 
 # Poses at which each demand is looked at in the beginning, and amount that is no miss.
@@ -318,10 +311,6 @@ COST_OF_MISSES, STEPS = 30.0, 12
 # Rounds after which a machine that misses a demand by more than this is given up, and those after
 # which it is for any miss.
 SHORT, HOPELESS, LONG = 3, 0.02, 10
-
-
-def _ignore(_: FloatArray, __: FloatArray) -> None:
-    return
 
 
 def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -237,10 +237,6 @@ class MachineValues:
         strut2, strut3 = ((b[1] * q[1] + b[2] * q[2]) for b, q in ((b2, held2), (b3, held3)))
         return [f1 * l1, held2[0], strut2 / d2, held3[0], strut3 / d4, f4 * l4]
 
-    def weight_forces(self, weight: Vec, centre: Vec) -> list[Any]:
-        """Return the actuators' forces under a weight at a point of the platform, from b4."""
-        return self.forces(weight, cross(self.of_platform(centre), weight))
-
     @cached_property
     def velocities(self) -> list[Vec]:
         """The velocity of the tool for a unit rate of each actuator."""

@@ -152,12 +152,6 @@ class Terms:
         """Return the values of machines (..., n) in poses over the box."""
         return MachineValues(x, self.edges, poses)
 
-    def tool_at(self, x: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return tool positions (k, 3), in mm, and rotations (k, 3, 3) of one machine in poses."""
-        at = self.values(x, poses)
-        columns = [m.rows_of(axis) for axis in (at.u, at.v, at.w)]
-        return self.scale_mm * m.rows_of(at.tool), np.stack(columns, axis=-1)
-
 
 def row_of(design: Design, terms: Terms) -> FloatArray:
     """Return a design as a machine, shape (18,), with home's tool at the centre of the box."""

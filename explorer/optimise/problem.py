@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
 import msgspec
+from msgspec.structs import force_setattr as _set
 
 from explorer.errors import InputError
 from explorer.measures.measure import longest_leg
@@ -73,12 +74,11 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         for field in ("volume", "reach", "clearance"):
             value = getattr(self, field)
             if value is not None:
-                label = f"the {field} demanded"
                 most = math.inf if field == "volume" else checks.MOST
-                msgspec.structs.force_setattr(self, field, checks.positive(label, value, most))
+                _set(self, field, checks.positive(f"the {field} demanded", value, most))
         for field in ("clearance_margin", "least"):
             value = checks.not_negative(f"the {field.replace('_', ' ')}", getattr(self, field))
-            msgspec.structs.force_setattr(self, field, value)
+            _set(self, field, value)
 
 
 class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -89,10 +89,10 @@ class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     high: float
 
     def __post_init__(self) -> None:
-        msgspec.structs.force_setattr(self, "name", str(self.name))
+        _set(self, "name", str(self.name))
         for field in ("low", "high"):
             value = checks.number(f"the {field} bound of {self.name}", getattr(self, field))
-            msgspec.structs.force_setattr(self, field, value)
+            _set(self, field, value)
 
 
 class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -113,11 +113,9 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     def __post_init__(self) -> None:
         if self.start.home is None:
-            with_home = msgspec.structs.replace(self.start, home=self.start.home_pose)
-            msgspec.structs.force_setattr(self, "start", with_home)
-        objective = checks.one_of("the objective", self.objective, OBJECTIVES)
-        msgspec.structs.force_setattr(self, "objective", objective)
-        msgspec.structs.force_setattr(self, "variables", tuple(self.variables))
+            _set(self, "start", msgspec.structs.replace(self.start, home=self.start.home_pose))
+        _set(self, "objective", checks.one_of("the objective", self.objective, OBJECTIVES))
+        _set(self, "variables", tuple(self.variables))
         if bounds_angles(self.start):
             raise DesignStartError(
                 "the volume has no gradient while joints bound the swing of legs: take these "

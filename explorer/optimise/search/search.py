@@ -150,7 +150,9 @@ class Search:
         for _ in range(ROUNDS):
             before = self.steps
             at = self._feasible(model, self._sqp(model, at.u, "solving", self._may_end))
-            is_done = self._is_done(model, at)
+            is_done = self._is_kept(model, at) and (
+                self.problem.objective == "match-volume" or optimality(model, at).is_optimal
+            )
             if is_done:
                 holding = optimality(model, at).holding
                 missed = model.look_at_unproven(at)
@@ -185,11 +187,6 @@ class Search:
             return False
         value, least = (self.trail.rank(iterate)[-1] for iterate in (optimum, self.to_beat))
         return value >= least - SAME * abs(least)
-
-    def _is_done(self, model: SearchModel, at: Evaluation) -> bool:
-        """Whether a place solves the problem, but for clearances between positions."""
-        is_matched = self.problem.objective == "match-volume"
-        return self._is_kept(model, at) and (is_matched or optimality(model, at).is_optimal)
 
     def _may_end(self, model: SearchModel, at: Evaluation) -> bool:
         """Whether the solver may end here: volume matched, or optimum that steps no longer change.

@@ -47,7 +47,7 @@ class Stop(Exception):  # noqa: N818 - a signal, not an error
 
 def slsqp(
     evaluate: Callable[[FloatArray], Point],
-    see: Callable[[FloatArray, FloatArray], None],
+    see: Callable[[FloatArray], None],
     start: FloatArray,
     bounds: FloatArray,
     equal: BoolArray,
@@ -57,7 +57,7 @@ def slsqp(
 ) -> FloatArray:
     """Return the variables at which SLSQP ends, within lows and highs (n, 2), shape (n,).
 
-    Each accepted iterate is seen, with the values of the demands: to be zero where they are to be
+    Each accepted iterate is seen. The values of the demands are to be zero where they are to be
     equal (m,), and else at least zero. Where there is no design, all are missed by far.
     """
     from scipy import optimize
@@ -77,9 +77,9 @@ def slsqp(
         return at(x)[0]
 
     def slope(x: FloatArray) -> FloatArray:
-        point = at(x)
-        see(x, point[2])
-        return point[1]
+        found = at(x)[1]
+        see(x)
+        return found
 
     def demand(which: BoolArray, part: int, x: FloatArray) -> FloatArray:
         return at(x)[2:][part][which]
@@ -115,7 +115,7 @@ def solve(
         at = model.at(u)
         return at.objective, at.slope, at.values, at.gradients
 
-    def accept(u: FloatArray, _: FloatArray) -> None:
+    def accept(u: FloatArray) -> None:
         try:
             at = model.at(u)
         except DesignError:
@@ -127,7 +127,7 @@ def solve(
     bounds, equal = model.bounds, model.equalities
     with contextlib.suppress(Stop):
         u = slsqp(evaluate, accept, start, bounds, equal, most=most, precision=PRECISION)
-        accept(u, u)
+        accept(u)
     return accepted[-1], len(accepted) - 1
 
 

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from explorer.mechanism.design import LENGTHS, Design
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.optimise.problem import REACH, YAW, Problem
 from explorer.workspace.limits import constraints
 from explorer.workspace.slices.volume import unexplained_volume
@@ -114,24 +114,19 @@ class SearchState:
         self, limit: constraints.BallOrCylinder | constraints.HalfSpace, p: FloatArray
     ) -> FloatArray:
         """Return the derivatives of the slack of a limit at fixed positions (k, 3), (k, n)."""
+        if not limit.rates:
+            return np.zeros((len(p), len(self.u)))
         by_limit = np.ones((len(p), 4))
         match limit:
             case constraints.BallOrCylinder():
-                offsets = p - limit.centre
-                if not limit.is_ball:
-                    offsets[:, 0] = 0.0
-                distance = np.sqrt(np.einsum("ki,ki->k", offsets, offsets))
-                by_limit[:, :3] = offsets / np.maximum(distance, 1e-300)[:, None]
+                offsets = (p - limit.centre) * (1.0 if limit.is_ball else constraints.ACROSS)
+                by_limit[:, :3] = offsets / np.maximum(lengths_of(offsets), 1e-300)[:, None]
                 by_limit *= 1.0 if limit.inside else -1.0
             case constraints.HalfSpace():
                 by_limit[:, :3] = -p
-        return by_limit @ self.motion(limit)
-
-    def motion(self, limit: constraints.BallOrCylinder | constraints.HalfSpace) -> FloatArray:
-        """Return the derivatives of a limit's centre and radius, or normal and offset, (4, n)."""
-        if not limit.rates:
-            return np.zeros((4, len(self.u)))
-        return np.column_stack([*limit.rates.values()]) @ self.rows(limit.rates)
+        # The centre and the radius, or the normal and the offset, by the scaled variables, (4, n).
+        motion = np.column_stack([*limit.rates.values()]) @ self.rows(limit.rates)
+        return by_limit @ motion
 
     def rows(self, names: Iterable[str]) -> FloatArray:
         """Return the derivatives of k parameters by the scaled variables, shape (k, n)."""
