@@ -164,17 +164,11 @@ def sound_parts(
             )
         if chunk >= study.chunks:
             continue
-        if part.chunk == chunk and _is_whole(table, study, chunk):
+        has_columns = part.chunk == chunk and table.column_names == [*columns_of(study)]
+        if has_columns and table.column("index").to_pylist() == [*study.rows_of(chunk)]:
             yield study, chunk, table
         else:
             damaged.append(path)
-
-
-def _is_whole(table: Any, study: Study, chunk: int) -> bool:
-    """Return whether a table holds all rows of a chunk."""
-    return table.column_names == [*columns_of(study)] and table.column("index").to_pylist() == [
-        *study.rows_of(chunk)
-    ]
 
 
 def pyarrow() -> Any:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -70,22 +70,12 @@ def columns_of(study: Study) -> dict[str, Kind]:
 def evaluate(study: bytes, start: int, stop: int) -> Rows:
     """Return the rows of the designs of an encoded study from one index to before another."""
     decoded = _decode_study(study)
-    indices = range(start, stop)
-    values = samples(decoded, indices)
-    rows = [
-        _row(decoded, index, dict(zip(decoded.variables, row, strict=True)))
-        for index, row in zip(indices, values.tolist(), strict=True)
-    ]
-    return _as_columns(decoded, indices, rows)
+    return _rows(decoded, range(start, stop), lambda sample: _measure(decoded, sample))
 
 
 def rows_of_dead_workers(study: Study, indices: range, reason: str) -> Rows:
     """Return the rows of designs whose evaluation killed its workers."""
-    rows: list[dict[str, Value]] = []
-    for index, row in zip(indices, samples(study, indices).tolist(), strict=True):
-        sample = dict(zip(study.variables, row, strict=True))
-        rows.append({"index": index, **sample, "status": "worker died", "reason": reason})
-    return _as_columns(study, indices, rows)
+    return _rows(study, indices, lambda _: {"status": "worker died", "reason": reason})
 
 
 def design_of(study: Study, values: Mapping[str, float], name: str | None = None) -> Design:
@@ -119,8 +109,7 @@ def check_study(study: Study) -> None:
     has_needs = any(CATALOGUE[name].needs for name in study.measures)
     cases: list[Case] = []
     for index in tried:
-        row = samples(study, range(index, index + 1))[0]
-        sample = dict(zip(study.variables, row.tolist(), strict=True))
+        (sample,) = _named_samples(study, range(index, index + 1))
         try:
             design = design_of(study, sample)
         except InputError as error:
@@ -138,11 +127,11 @@ def check_study(study: Study) -> None:
 
 def load_kernels(study: Study) -> None:
     """Import all kernels that the rows of a study may need."""
-    for is_needed, module in (
-        ("accessible_volume" in study.measures, "explorer.workspace.accessible.workspace"),
-        ("held_volume" in study.measures, "explorer.workspace.carried_region"),
+    for measure, module in (
+        ("accessible_volume", "explorer.workspace.accessible.workspace"),
+        ("held_volume", "explorer.workspace.carried_region"),
     ):
-        if is_needed:
+        if measure in study.measures:
             importlib.import_module(module)
 
 
@@ -156,43 +145,47 @@ def _decode_study(study: bytes) -> Study:
     return decoded
 
 
-def _row(study: Study, index: int, sample: dict[str, float]) -> dict[str, Value]:
-    row: dict[str, Value] = {"index": index, **sample}
+def _rows(
+    study: Study, indices: range, measure: Callable[[dict[str, float]], dict[str, Value]]
+) -> Rows:
+    """Return the rows of designs, given what measures the design of a sample."""
+    numbered = zip(indices, _named_samples(study, indices), strict=True)
+    rows = [{"index": index, **sample, **measure(sample)} for index, sample in numbered]
+    columns = {name: [_finite_or_none(row.get(name)) for row in rows] for name in columns_of(study)}
+    return Rows(indices, columns, versions())
+
+
+def _measure(study: Study, sample: dict[str, float]) -> dict[str, Value]:
+    """Return the values, the status and the reason of a design; without values if it fails."""
     try:
-        _measure(study, sample, row)
+        return _measured(Case(design_of(study, sample), study.nodes, study.clearance_margin), study)
     except DesignError as error:
-        row |= {"status": "invalid design", "reason": one_line(str(error))}
+        status, reason = "invalid design", str(error)
     except InputError as error:
-        row |= {"status": "failed", "reason": one_line(str(error))}
+        status, reason = "failed", str(error)
     except Exception as error:  # noqa: BLE001 - an error of one design must not end the others
-        row |= {"status": "failed", "reason": one_line(f"{type(error).__name__}: {error}")}
-    return row
+        status, reason = "failed", f"{type(error).__name__}: {error}"
+    return {"status": status, "reason": one_line(reason)}
 
 
-def _measure(study: Study, sample: dict[str, float], row: dict[str, Value]) -> None:
-    """Write the values, the status and the reason of a design into its row."""
+def _measured(case: Case, study: Study) -> dict[str, Value]:
     status, reason = "done", ""
-    design = design_of(study, sample)
-    case = Case(design, study.nodes, study.clearance_margin)
-    if case.volume.volume <= 0.0 and status == "done":
+    if case.volume.volume <= 0.0:
         because = ", ".join(case.volume.empty_because)
         status, reason = "empty workspace", f"emptied by {because}" if because else "no volume"
     measured = measure_design(case, study.measures)
     lacking = unmet_needs([case], study.measures)
-    lacking = f"it has {lacking}" if lacking else ""
-    reasons = (reason, lacking, reason_for_missing(case, measured))
-    row |= measured.values
-    row |= {"status": status, "reason": "; ".join(filter(None, reasons))}
-
-
-def _as_columns(study: Study, indices: range, rows: list[dict[str, Value]]) -> Rows:
-    columns = {name: [_finite_or_none(row.get(name)) for row in rows] for name in columns_of(study)}
-    return Rows(indices, columns, versions())
+    reasons = reason, lacking and f"it has {lacking}", reason_for_missing(case, measured)
+    return {**measured.values, "status": status, "reason": "; ".join(filter(None, reasons))}
 
 
 def _finite_or_none(value: Value) -> Value:
     """Return a value, or None for NaN and infinity."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _named_samples(study: Study, rows: range) -> Iterator[dict[str, float]]:
+    return (dict(zip(study.variables, row, strict=True)) for row in samples(study, rows).tolist())
 
 
 def samples(study: Study, rows: range) -> FloatArray:

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import Any, Literal, cast, get_args
 
 import msgspec
+from msgspec.structs import force_setattr as _set
 
 from explorer.errors import InputError
 from explorer.files.json_text import decode_strictly
@@ -46,10 +47,6 @@ MOST_IN_CHUNK = 100_000
 LARGEST_SEED = 2**31 - 1
 
 DEFAULT_MEASURES = ("volume", "reach", "worst_margin", "clearance", "inverse_condition")
-
-
-def _set(struct: msgspec.Struct, name: str, value: object) -> None:
-    msgspec.structs.force_setattr(struct, name, value)
 
 
 class Sampling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
