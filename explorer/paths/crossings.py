@@ -24,7 +24,7 @@ from explorer.errors import InputError
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.numerics.arrays import FloatArray, lengths_of, triple
 
 # A margin is zero at a pose, and over a whole move, below these shares of |position| + |way|.
 ROUNDING, ALL_ALONG = 1e-13, 1e-12
@@ -104,9 +104,8 @@ def path_margins(poses: Sequence[Pose], tool: ArrayLike | None = None) -> PathMa
                 pose = Pose.of(*moves.poses(np.array(index), np.array(share)))
                 found.append(Crossing(number + 1, index, share, pose, changes, side))
         crossings += sorted(found, key=lambda crossing: crossing.share)
-    least1, least2, least3 = least.tolist()
     merged = tuple(_merge_corners(crossings))
-    return PathMargins(tuple(poses), (least1, least2, least3), merged, tuple(sorted(lies_in)))
+    return PathMargins(tuple(poses), triple(least), merged, tuple(sorted(lies_in)))
 
 
 def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:

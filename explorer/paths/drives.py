@@ -158,11 +158,9 @@ class PathDrives(ActuatorMotion):
         found = [
             ActuatorMotion.of(design, law, law.within_intervals([part]), bodies) for part in PARTS
         ]
+        parts = zip(*((m.time, m.speed, m.acceleration, m.force) for m in found), strict=True)
         time, speed, acceleration, force = (
-            np.stack(each, axis=1).reshape(-1, *each[0].shape[1:])
-            for each in zip(
-                *((m.time, m.speed, m.acceleration, m.force) for m in found), strict=True
-            )
+            np.stack(each, axis=1).reshape(-1, *each[0].shape[1:]) for each in parts
         )
         return PathDrives(time, speed, acceleration, force, design, law, bodies)
 

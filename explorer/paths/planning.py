@@ -28,6 +28,7 @@ from explorer.mechanism.folds import FOLD_LINES, from_folds, to_folds, write_pos
 from explorer.mechanism.margins import INCIDENCES, mode_name
 from explorer.mechanism.pose import Pose, Triple
 from explorer.motion.weights import MovingBodies
+from explorer.numerics.arrays import triple
 from explorer.numerics.number_text import format_apart
 from explorer.paths import search
 from explorer.paths.loads import ROUNDING, DemandedLoad
@@ -127,9 +128,7 @@ def plan_path(
     """
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"planning needs a time above zero, in seconds; got {seconds:g}")
-    if tool is not None:
-        x, y, z = one_tool(tool).tolist()
-        tool = (x, y, z)
+    tool = None if tool is None else triple(one_tool(tool))
     demanded_load = None if load is None else DemandedLoad.of(design, load, weights)
     ends = evaluate(design, start), evaluate(design, goal)
     _check_ends(*ends, demanded_load)

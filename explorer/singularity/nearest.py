@@ -155,23 +155,13 @@ def nearest_singular_poses(configuration: Configuration) -> NearestPoses:
     platform, batch = PlatformPoints.of(configuration.design), configuration.batch
     # The kernel's tolerances are those of a platform whose own length is one.
     unit = platform.length
-    p_rows, r_rows = configuration.positions / unit, configuration.rotations
-    count = len(p_rows)
+    points = platform.points / unit, platform.centroid / unit, platform.scatter / unit**2
+    poses = configuration.positions / unit, configuration.rotations
+    count = len(poses[0])
     distance, bound = np.empty((count, 3)), np.empty((count, 3))
     near_p, near_r = np.empty((count, 3, 3)), np.empty((count, 3, 3, 3))
-    nearest_rows(
-        # The branch and bound examines some hundred boxes for each pose.
-        100 * count,
-        platform.points / unit,
-        platform.centroid / unit,
-        platform.scatter / unit**2,
-        p_rows,
-        r_rows,
-        distance,
-        bound,
-        near_p,
-        near_r,
-    )
+    # The branch and bound examines some hundred boxes for each pose.
+    nearest_rows(100 * count, *points, *poses, distance, bound, near_p, near_r)
     return NearestPoses(
         (distance * unit).reshape(*batch, 3),
         (bound * unit).reshape(*batch, 3),
