@@ -159,13 +159,7 @@ class Best(NamedTuple):
 
 @dataclass(frozen=True)
 class _LocalLoad:
-    """A load at one orientation, with the limits of the workspace there.
-
-    Attributes:
-        workspace: The workspace.
-        case: What `explorer.statics.load_cases.load_case` returns.
-        part_names: Names of the parts that may give way.
-    """
+    """A load in a workspace, as `load_case` returns it, with the names of the parts under it."""
 
     workspace: Workspace
     case: FloatArray

@@ -120,6 +120,11 @@ def least_clearances(
         is_too_close = ~np.isnan(positions[:, 0]) | math.isinf(below)
         return np.asarray(best - np.where(is_too_close, resolution, 0.0))
 
+    def settle(low: FloatArray, divides: BoolArray) -> None:
+        """Keep the least bounds (n, 6) of cells that are not divided for a pair."""
+        least = np.where(divides, math.inf, low).min(axis=0, initial=math.inf)
+        settled[:] = np.minimum(settled, least)
+
     while len(middles):
         half = 0.5 * size
         kept = [(np.zeros((0, 3)), np.zeros((0, len(PAIRS))))]
@@ -142,28 +147,17 @@ def least_clearances(
                 best[pair], positions[pair] = domain.descend(pair, best[pair], positions[pair])
             best[best <= CROSSING * design.reach] = 0.0
             low = np.maximum(distance - float(np.linalg.norm(half)), plane_distance)
-            raise_bounds(
-                len(low),
-                is_open & (low < sought()),
-                LEGS_OF_PAIRS,
-                leg_axes(at),
-                half,
-                *slack,
-                low,
-            )
+            needed = is_open & (low < sought())
+            raise_bounds(len(low), needed, LEGS_OF_PAIRS, leg_axes(at), half, *slack, low)
             divides = is_open & (low < sought())
-            settled = np.minimum(
-                settled, np.where(divides, math.inf, low).min(axis=0, initial=math.inf)
-            )
+            settle(low, divides)
             divided = divides.any(axis=-1)
             kept.append((at.position[divided], low[divided]))
         middles, low = (np.concatenate(each) for each in zip(*kept, strict=True))
         divides = is_open & (low < sought())
         is_open = is_open & (divides.sum(axis=0) <= MOST_CELLS)
         divides = divides & is_open
-        settled = np.minimum(
-            settled, np.where(divides, math.inf, low).min(axis=0, initial=math.inf)
-        )
+        settle(low, divides)
         size = half
         middles = middles[divides.any(axis=-1)]
         middles = (middles[:, None, :] + size * CORNERS).reshape(-1, 3)

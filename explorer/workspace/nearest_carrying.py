@@ -42,8 +42,7 @@ def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
     own = np.sign(margins(pose.position, pose.rotation)).astype(np.int64).tolist()
     # A margin of zero takes the sign of home.
     x, y, z = (sign or home for sign, home in zip(own, design.home_signs, strict=True))
-    signs = x, y, z
-    workspace = Workspace(design, pose.rotation, signs=signs)
+    workspace = Workspace(design, pose.rotation, signs=(x, y, z))
     whole = whole_solid(workspace)
     if whole.is_empty:
         return None
@@ -71,12 +70,7 @@ def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
 
 @dataclass(frozen=True)
 class _Search:
-    """A search for positions that hold a load.
-
-    Attributes:
-        loaded: The pose under the load.
-        workspace: The workspace in the mode of the pose.
-    """
+    """A search for positions that hold the load of a pose, in the workspace of its mode."""
 
     loaded: LoadedPose
     workspace: Workspace

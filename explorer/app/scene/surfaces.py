@@ -148,8 +148,8 @@ class _Bands:
         high = off >= 0.0
         if high.all() or not high.any():
             return
-        division = divide(self.triangles, high)
-        a, b = division.ends.T
+        ends, self.triangles, _ = divide(self.triangles, high)
+        a, b = ends.T
         start, span = self.vertices[a], self.vertices[b] - self.vertices[a]
         share = -off[a] / (off[b] - off[a])
         value = self.value
@@ -159,7 +159,6 @@ class _Bands:
             )
         self.vertices = np.concatenate([self.vertices, start + share[:, None] * span])
         self.values = np.concatenate([self.values, np.full(len(a), level)])
-        self.triangles = division.faces
 
     def shells(self, bands: PositionBands) -> tuple[Shell, ...]:
         """Return the triangles in the colours of bands."""

@@ -190,12 +190,8 @@ def accessible_part(
             stages.begin(f"collisions of {PAIR_NAMES[pair]}")
             blocked[pair] = max(0.0, volume - carver.carve([pair])[1])
         stages.begin("nodes of the grid")
-    costs = [
-        PairCost(
-            legs, float(least.clearance[pair]), float(least.bound[pair]), blocked.get(pair, 0.0)
-        )
-        for pair, legs in enumerate(PAIRS)
-    ]
+    rows = zip(PAIRS, least.clearance.tolist(), least.bound.tolist(), strict=True)
+    costs = [PairCost(*row, blocked.get(pair, 0.0)) for pair, row in enumerate(rows)]
     counts = count_nodes(workspace, p, step, most_nodes)
     return AccessibleWorkspace(volume, accessible, solid, step, *counts, tuple(costs))
 
@@ -232,22 +228,18 @@ class _Carver:
         """
         if self.radii[pair] > 0.0:
             return True
-        surveyed = self.survey
-        cut = surveyed.accessible_from(self.start, ()) & ~surveyed.accessible_from(
-            self.start, [pair]
-        )
-        return bool(
-            (cut & (surveyed.clearance[..., pair] > SLACK * self.workspace.design.reach)).any()
-        )
+        surveyed, slack = self.survey, SLACK * self.workspace.design.reach
+        reached = surveyed.accessible_from(self.start, [pair])
+        cut = surveyed.accessible_from(self.start, ()) & ~reached
+        return bool((cut & (surveyed.clearance[..., pair] > slack)).any())
 
     def carve(self, pairs: list[int]) -> tuple[Solid, float]:
         """Cut out collisions of some pairs; return the part with the start, and its volume."""
         surfaces = [self._surface(pairs)] if pairs else []
         solid = carved_solid(self.whole, surfaces, self.start)
         # Both meshes lack the same volume at the limits, so it cancels in their difference.
-        return solid, max(
-            0.0, volume_of(self.workspace).volume - max(0.0, self.whole.volume - solid.volume)
-        )
+        removed = max(0.0, self.whole.volume - solid.volume)
+        return solid, max(0.0, volume_of(self.workspace).volume - removed)
 
     def _surface(self, pairs: list[int]) -> Surface:
         from scipy.ndimage import binary_dilation
@@ -270,14 +262,12 @@ class _Carver:
         # Far from all nodes within the limits there is nothing to cut.
         near: Any = binary_dilation(surveyed.within, CUBE)
         values[~near] = np.abs(values[~near])
-        return Surface(
-            values,
-            surveyed.grid.lows,
-            surveyed.grid.step,
-            partial(self._project, pairs),
-            PAIR_NAMES,
-            lambda points: self._nearest_pairs(pairs, points)[1],
-        )
+        grid, project = surveyed.grid, partial(self._project, pairs)
+
+        def name_of(points: FloatArray) -> IntArray:
+            return self._nearest_pairs(pairs, points)[1]
+
+        return Surface(values, grid.lows, grid.step, project, PAIR_NAMES, name_of)
 
     def _project(self, pairs: list[int], points: FloatArray, beside: FloatArray) -> FloatArray:
         """Project points (n, 3) onto the surface at which the nearest pair of legs collides.

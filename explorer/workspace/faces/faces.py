@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,23 +23,12 @@ from explorer.workspace.solids.facets import Box
 from explorer.workspace.workspace import Workspace
 
 
-class Division(NamedTuple):
-    """Triangles divided along a line.
+def divide(faces: IntArray, high: BoolArray) -> tuple[IntArray, IntArray, BoolArray]:
+    """Divide the faces (m, 3) with vertices on either side of a level, high for n vertices.
 
-    Attributes:
-        ends: Ends of the edges that the line crosses, the one below the level first, shape (k, 2).
-            The i-th of them gets the vertex n + i, where n is the number of vertices so far.
-        faces: Faces after the division, shape (m, 3).
-        is_high: Whether each of these faces is above the level, shape (m,).
+    Return the ends of the edges that the level crosses, the low one first, shape (k, 2), of which
+    the i-th gets the vertex n + i; all faces, shape (l, 3); and whether each is high, shape (l,).
     """
-
-    ends: IntArray
-    faces: IntArray
-    is_high: BoolArray
-
-
-def divide(faces: IntArray, high: BoolArray) -> Division:
-    """Divide the faces (m, 3) with vertices on either side of a level, high for n vertices."""
     count = len(high)
     sides = high[faces]
     number: IntArray = sides.sum(axis=1)
@@ -54,11 +42,9 @@ def divide(faces: IntArray, high: BoolArray) -> Division:
     keys, inverse = np.unique(low * count + high, return_inverse=True)
     on_ab, on_ac = count + inverse.reshape(2, -1)
     parts = ((a, on_ab, on_ac), (on_ab, b, c), (on_ab, c, on_ac))
-    return Division(
-        np.stack(np.divmod(keys, count), axis=1),
-        np.concatenate([faces[whole], *(np.stack(part, axis=1) for part in parts)]),
-        np.concatenate([number[whole] == 3, lone_is_high, ~lone_is_high, ~lone_is_high]),
-    )
+    faces = np.concatenate([faces[whole], *(np.stack(part, axis=1) for part in parts)])
+    is_high = np.concatenate([number[whole] == 3, lone_is_high, ~lone_is_high, ~lone_is_high])
+    return np.stack(np.divmod(keys, count), axis=1), faces, is_high
 
 
 # Distances below this share of the size of a workspace are rounding; those of roots are
@@ -216,13 +202,13 @@ def _cut_by(cut: _Cut, surfaces: Surfaces, index: int, rounding: float) -> _Cut:
     a, b, c = triangles.T
     if (high[a] & high[b] & high[c]).all():
         return replace(cut, triangles=triangles)
-    division = divide(triangles, high)
-    points, common = _cross(cut, surfaces, index, value, division.ends, rounding)
+    ends, faces, is_high = divide(triangles, high)
+    points, common = _cross(cut, surfaces, index, value, ends, rounding)
     return _Cut(
         np.concatenate([cut.vertices, points]),
-        np.concatenate([cut.owner, cut.owner[division.ends[:, 0]]]),
+        np.concatenate([cut.owner, cut.owner[ends[:, 0]]]),
         np.concatenate([cut.cuts, common | (1 << index)]),
-        division.faces[division.is_high],
+        faces[is_high],
     )
 
 

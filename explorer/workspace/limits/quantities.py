@@ -332,7 +332,9 @@ class Demand:
             return f"sign as at home{least}"
         if self.high.value == math.inf:
             return f"at least {number(self.low)}"
-        if not self.is_range:
+        # No length or angle is below zero.
+        least = 0.0 if self.quantity in (GAP, *range(L1, ANGLE + 1)) else -math.inf
+        if self.low.value <= least:
             return f"at most {number(self.high)}"
         return f"{number(self.low)} to {number(self.high)}"
 
@@ -341,9 +343,3 @@ class Demand:
         """Whether the words of the range have a length in them."""
         ends = self.low.value, self.high.value
         return self.angle is None and any(end and math.isfinite(end) for end in ends)
-
-    @property
-    def is_range(self) -> bool:
-        """Whether both ends exclude something; no length or angle is below zero."""
-        least = 0.0 if self.quantity in (GAP, *range(L1, ANGLE + 1)) else -math.inf
-        return self.low.value > least and self.high.value < math.inf

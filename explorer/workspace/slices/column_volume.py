@@ -131,13 +131,7 @@ def volume_of_columns(
 
 @dataclass(frozen=True)
 class _Slices:
-    """Slices across y of a region, or of the part of it that holds a load.
-
-    Attributes:
-        region: The region.
-        case: Row of the load; empty without one.
-        rotation: Platform to base, shape (3, 3).
-    """
+    """Slices across y of a region, or of the part of it that holds a load, if it has a case."""
 
     region: Region
     case: FloatArray
