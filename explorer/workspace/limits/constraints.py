@@ -207,7 +207,7 @@ def solids_of(design: Design, r: FloatArray, demand: Demand) -> Iterator[Constra
         yield from _balls(demand, *apex_of(design, r, leg), is_ball=leg in (0, 3))
     elif kind <= quantities.ORDER:
         # d3 − d1 is the same at every position.
-        apart = float(line_of(design, r, kind)[1])
+        apart = line_of(design, r, kind)[1]
         value = apart if kind == quantities.ORDER else abs(apart)
         _, low, high, *_ = demand.row(design)
         if not low <= value <= high:
@@ -217,14 +217,13 @@ def solids_of(design: Design, r: FloatArray, demand: Demand) -> Iterator[Constra
 
 
 def apex_of(design: Design, r: FloatArray, leg: int) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return the positions at which a leg has no length, at orientations (..., 3, 3), (..., 3).
+    """Return the position (3,) at which a leg has no length, and its derivatives by parameter.
 
-    For the legs on the guide x is 0. Their derivatives by parameter come with them.
+    For the legs on the guide x is 0. The rotation has the shape (3, 3).
     """
-    u, v = r[..., 0], r[..., 1]
+    u, v = r[:, 0], r[:, 1]
     if leg == 3:
-        apex = np.broadcast_to([*design.a3, 0.0], u.shape)
-        return apex, {"a3x": AXES[0], "a3y": AXES[1]}
+        return np.array([*design.a3, 0.0]), {"a3x": AXES[0], "a3y": AXES[1]}
     if leg == 0:
         b1x, b1y = design.b1
         arm = b1x * u + b1y * v
@@ -246,37 +245,32 @@ def _balls(
 
 def line_of(
     design: Design, r: FloatArray, kind: int
-) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
-    """Return k, c and the derivatives of (k, c) by parameter of a quantity k·p + c.
+) -> tuple[FloatArray, float, dict[str, FloatArray]]:
+    """Return k (3,), c and the derivatives (4,) of both by parameter of a quantity k·p + c.
 
-    At orientations (..., 3, 3) they have the shapes (..., 3), (...) and (..., 4). For the distance
-    d3 − d1 of the carriages k is zero.
+    The rotation has the shape (3, 3). For the distance d3 − d1 of the carriages k is zero.
     """
-    u, n = r[..., 0], r[..., 2]
+    u, n = r[:, 0], r[:, 2]
     if kind >= quantities.D1:
         names = {quantities.D1: {"b2": 1.0}, quantities.D3: {"b3": 1.0}}
         shares = names.get(kind, {"b3": 1.0, "b2": -1.0})
         b = sum(share * getattr(design, name) for name, share in shares.items())
-        rates = {name: _scalar_rate(share * u[..., 0]) for name, share in shares.items()}
-        rates[YAW] = _scalar_rate(b * _turning(u)[..., 0])
-        axis = AXES[0] if kind in names else np.zeros(3)
-        return np.broadcast_to(axis, u.shape), b * u[..., 0], rates
-    still = np.zeros(u.shape[:-1])
+        rates = {name: _scalar_rate(share * float(u[0])) for name, share in shares.items()}
+        rates[YAW] = _scalar_rate(-b * float(u[1]))
+        return AXES[0] if kind in names else np.zeros(3), b * float(u[0]), rates
     if kind <= quantities.Z:
-        return np.broadcast_to(AXES[kind - quantities.X], u.shape), still, {}
+        return AXES[kind - quantities.X], 0.0, {}
     if kind == quantities.DELTA1:
         gradient, turning = -n, -_turning(n)
     elif kind == quantities.DELTA2:
-        gradient, turning = (
-            np.stack([still, -v[..., 2], v[..., 1]], axis=-1) for v in (u, _turning(u))
-        )
+        gradient, turning = (np.array([0.0, -v[2], v[1]]) for v in (u, _turning(u)))
     else:
-        gradient, turning = np.broadcast_to(AXES[2], u.shape), np.zeros(u.shape)
-    return gradient, still, {YAW: np.concatenate([turning, still[..., None]], axis=-1)}
+        gradient, turning = AXES[2], np.zeros(3)
+    return gradient, 0.0, {YAW: np.append(turning, 0.0)}
 
 
 def _half_spaces(
-    demand: Demand, k: FloatArray, c: FloatArray, line_rates: dict[str, FloatArray]
+    demand: Demand, k: FloatArray, c: float, line_rates: dict[str, FloatArray]
 ) -> Iterator[Constraint]:
     """Yield the half-spaces of a demand on k·p + c."""
     if float(np.linalg.norm(k)) <= PARALLEL:
@@ -288,7 +282,7 @@ def _half_spaces(
         signs = np.array([side, side, side, -side])
         rates = {key: signs * rate for key, rate in line_rates.items()}
         _add_rates(rates, bound, side)
-        yield HalfSpace(name, side * k, side * (bound.value - float(c)), rates)
+        yield HalfSpace(name, side * k, side * (bound.value - c), rates)
 
 
 def _cone(design: Design, r: FloatArray, demand: Demand, angle: LegAngle) -> Constraint:
@@ -306,10 +300,10 @@ def _add_rates(rates: dict[str, FloatArray], bound: Bound, sign: float) -> None:
 
 
 def _turning(vector: FloatArray) -> FloatArray:
-    """Return the derivative by the yaw of vectors (..., 3) that turn about z with the platform."""
-    return np.stack([-vector[..., 1], vector[..., 0], np.zeros(vector.shape[:-1])], axis=-1)
+    """Return the derivative by the yaw of a vector (3,) that turns about z with the platform."""
+    return np.array([-vector[1], vector[0], 0.0])
 
 
-def _scalar_rate(rate: ArrayLike) -> FloatArray:
-    """Return derivatives of primitives whose radius or offset alone changes, shape (..., 4)."""
-    return np.multiply.outer(rate, [0.0, 0.0, 0.0, 1.0])
+def _scalar_rate(rate: float) -> FloatArray:
+    """Return derivatives of primitives whose radius or offset alone changes, shape (4,)."""
+    return np.array([0.0, 0.0, 0.0, rate])
