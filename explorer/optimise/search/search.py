@@ -33,7 +33,7 @@ from explorer.optimise.search.model import Evaluation, SearchModel, reported_obj
 from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimality, solve
 from explorer.optimise.search.starts import promising_starts
 from explorer.optimise.search.state import SearchState, scales
-from explorer.workspace.slices.volume import emptying_limits, unexplained_volume
+from explorer.workspace.slices.volume import unexplained_volume, volume_of
 
 # Largest F = |1 − V/V′| of a matched volume.
 MATCHED = 1e-10
@@ -129,7 +129,7 @@ class Search:
         try:
             trail.before_each()
             if here.volume <= 0.0:
-                because = emptying_limits(here.workspace)
+                because = volume_of(here.workspace).empty_because
                 trail.add(here, "solving", because[0] if because else "", -1.0)
                 words = (
                     f"the workspace is empty because of {', '.join(because)}: start from a design "
@@ -288,7 +288,7 @@ class Search:
             status = "not converged" if self.steps_left <= 0 else "infeasible"
             return Attempt(status, worst if spare < 0.0 else holding, "", best)
         if at.state.volume <= 0.0:
-            because = ", ".join(emptying_limits(at.state.workspace))
+            because = ", ".join(volume_of(at.state.workspace).empty_because)
             words = f"the workspace of the best design found is empty because of {because}"
             return Attempt("infeasible", because, words, best)
         return Attempt("stalled", holding, "", best)

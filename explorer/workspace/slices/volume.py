@@ -87,24 +87,19 @@ def workspace_volume(design: Design, rotation: ArrayLike | None = None) -> Volum
     return volume_of(Workspace(design, rotation))
 
 
+@computed_once
 def volume_of(workspace: Workspace) -> Volume:
     """Return the volume of a workspace, its gradient, and the limits that empty an empty one."""
     plain = unexplained_volume(workspace)
     if plain.volume > 0.0:
         return plain
-    return replace(plain, empty_because=emptying_limits(workspace))
+    return replace(plain, empty_because=find_emptying_limits(workspace.limits))
 
 
 @computed_once
 def unexplained_volume(workspace: Workspace) -> Volume:
     """Return the volume of a workspace, without the limits that empty an empty one."""
     return Volume(*region_volume(workspace.region), ())
-
-
-@computed_once
-def emptying_limits(workspace: Workspace) -> tuple[str, ...]:
-    """Return the names of the limits that empty an empty workspace."""
-    return find_emptying_limits(workspace.limits)
 
 
 def region_volume(

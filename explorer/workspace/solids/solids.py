@@ -30,12 +30,7 @@ from explorer.workspace.limits.constraints import (
     shift,
 )
 from explorer.workspace.limits.region import contract_box, region_of
-from explorer.workspace.slices.volume import (
-    emptying_limits,
-    find_emptying_limits,
-    region_volume,
-    unexplained_volume,
-)
+from explorer.workspace.slices.volume import find_emptying_limits, region_volume, volume_of
 from explorer.workspace.solids import facets
 from explorer.workspace.solids.facets import Box, TessellationFrame, frame_around
 from explorer.workspace.solids.solid import Solid, manifold_of, mesh_of, solid_of, union
@@ -83,10 +78,12 @@ def workspace_solid(
 @computed_once
 def whole_solid(workspace: Workspace, tolerance: float | None = None) -> Solid:
     """Return all of a workspace as a mesh, as `workspace_solid` does."""
-    exact, limits = unexplained_volume(workspace), workspace.limits
+    exact, limits = volume_of(workspace), workspace.limits
     frame = _frame_of([limits], workspace.design.reach, tolerance)
     solid = _make_agreeing_solid(limits, frame, (exact.volume, 2.0 * exact.error))
-    return replace(solid, empty_because=emptying_limits(workspace)) if solid.is_empty else solid
+    if not solid.is_empty:
+        return solid
+    return replace(solid, empty_because=exact.empty_because or find_emptying_limits(limits))
 
 
 def _limits_over(
