@@ -51,7 +51,7 @@ STRATA: tuple[tuple[int, ...], ...] = tuple(
 )
 """The 24 permutations by dimension, from both flags coinciding to the generic one."""
 
-_RANKS_OF_STRATA = np.stack([ranks(w)[1:4, 1:4] for w in STRATA])
+_RANKS_OF_STRATA = np.stack([ranks(w)[1:4, 1:4].ravel() for w in STRATA])
 
 
 def stratum(position: ArrayLike, rotation: ArrayLike, length: float | None = None) -> IntArray:
@@ -72,11 +72,9 @@ def stratum(position: ArrayLike, rotation: ArrayLike, length: float | None = Non
     """
     p = position_array("position", position)
     r = rotation_array(rotation)
-    shape = batch_shape((p, 1), (r, 2))
-    ranks = np.zeros((*shape, 3, 3), dtype=np.int64)
-    for (i, j), rank in _ranks_of_pose(p, r, length).items():
-        ranks[..., i, j] = rank
-    holds = (ranks[..., None, :, :] >= _RANKS_OF_STRATA).all(axis=(-2, -1))
+    batch_shape((p, 1), (r, 2))
+    ranks = np.stack(np.broadcast_arrays(*_ranks_of_pose(p, r, length)), axis=-1)
+    holds = (ranks[..., None, :] >= _RANKS_OF_STRATA).all(axis=-1)
     return np.array(STRATA)[np.argmax(holds, axis=-1)]
 
 
@@ -86,10 +84,8 @@ def stratum_of(configuration: Configuration) -> Stratum:
     return tuple(stratum(c.position, c.rotation, c.design.reach).tolist())
 
 
-def _ranks_of_pose(
-    p: FloatArray, r: FloatArray, length: float | None
-) -> dict[tuple[int, int], IntArray]:
-    """Return r_ij of poses by (i - 1, j - 1), from distances and angles."""
+def _ranks_of_pose(p: FloatArray, r: FloatArray, length: float | None) -> list[IntArray]:
+    """Return r_11, r_12, …, r_33 of poses, from distances and angles."""
     u, n = r[..., 0], r[..., 2]
     across = np.hypot(p[..., 1], p[..., 2])
     distance = np.hypot(p[..., 0], across)
@@ -109,17 +105,17 @@ def _ranks_of_pose(
     def count(least: int, one_more: object) -> IntArray:
         return least + np.asarray(one_more, dtype=np.int64)
 
-    return {
-        (0, 0): count(0, point_on_point),
-        (0, 1): count(0, a1_on_line),
-        (0, 2): count(0, a1_on_plane),
-        (1, 0): count(0, b4_on_line),
-        (1, 1): count(0, lines_meet | lines_parallel) + (lines_parallel & b4_on_line),
-        (1, 2): count(1, base_line_along_plane & a1_on_plane),
-        (2, 0): count(0, b4_on_plane),
-        (2, 1): count(1, line_along_base_plane & b4_on_plane),
-        (2, 2): count(2, planes_parallel & b4_on_plane),
-    }
+    return [
+        count(0, point_on_point),
+        count(0, a1_on_line),
+        count(0, a1_on_plane),
+        count(0, b4_on_line),
+        count(0, lines_meet | lines_parallel) + (lines_parallel & b4_on_line),
+        count(1, base_line_along_plane & a1_on_plane),
+        count(0, b4_on_plane),
+        count(1, line_along_base_plane & b4_on_plane),
+        count(2, planes_parallel & b4_on_plane),
+    ]
 
 
 Stratum = tuple[int, ...]
