@@ -120,12 +120,7 @@ def find_or_relax(
 
 @dataclass
 class _Nearest(Search):
-    """The search for the nearest value of one field.
-
-    Attributes:
-        field: The field.
-        factor: Factor on it that the last machine asked for.
-    """
+    """The search for the nearest value of one field, with the factor of the last machine on it."""
 
     field: str = ""
     factor: float = 1.0

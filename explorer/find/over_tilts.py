@@ -41,12 +41,7 @@ def prove_limits(x: FloatArray, terms: Terms, ranges: FloatArray) -> CellValues:
     """Return by how much each limit is missed at most over all poses, over the box's diagonal.
 
     Longest and shortest lengths of the four legs come first, then the `limits_of` the requirement;
-    places are poses.
-
-    Args:
-        x: The machine.
-        terms: The requirement.
-        ranges: Shortest and longest length of each leg, shape (4, 2).
+    places are poses. The ranges are the shortest and the longest length of each leg, shape (4, 2).
     """
     limits, rates = limits_of(terms), _rates(x, terms)
 

@@ -251,13 +251,10 @@ class NodeMeasures:
 def node_measures(
     workspace: Workspace, *, nodes: int = DEFAULT_NODES, clearance_margin: float = 0.0
 ) -> NodeMeasures:
-    """Measure the constant-orientation workspace at the nodes of a grid.
+    """Measure a workspace at the nodes of a grid, so many on each axis of a box about it.
 
-    Args:
-        workspace: The workspace; the radii of the legs are those of its design's limits.
-        nodes: Number of nodes on each axis of a box about the workspace.
-        clearance_margin: Least |δ|, in design units, of nodes at which clearances count;
-            nearer to a singularity legs may have to meet.
+    Clearances count at nodes with every |δ| at least `clearance_margin`, in design units: nearer to
+    a singularity legs may have to meet.
 
     Raises:
         InputError: Too few or too many nodes.

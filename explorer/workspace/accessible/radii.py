@@ -70,11 +70,9 @@ class RadiusCurve:
 
 @computed_once
 def radius_curve(workspace: Workspace, *, cells: int = DEFAULT_CELLS) -> RadiusCurve:
-    """Compute the accessible volume against one radius of all legs.
+    """Compute the accessible volume against one radius of all legs, whatever the design's own are.
 
-    Args:
-        workspace: The workspace; the radii of its design are ignored.
-        cells: Number of cells of the grid on each axis of the workspace's extent.
+    The grid has a number of cells on each axis of the workspace's extent.
 
     Raises:
         InputError: Home breaks a limit, or legs cross there.
