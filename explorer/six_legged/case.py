@@ -80,7 +80,7 @@ class TableCase:
     @cached_property
     def box(self) -> tuple[FloatArray, FloatArray] | None:
         """The lows and highs of the workspace, each (3,), exact; None if it is empty."""
-        points = extremes_of(self.limits, self.region, self.table.reach, np.zeros((0, 3)))
+        points = extremes_of(self.limits, self.region, self.table.reach)
         is_empty = not len(points) or self.volume.volume <= 0.0
         return None if is_empty else (points.min(axis=0), points.max(axis=0))
 

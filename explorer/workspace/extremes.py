@@ -54,40 +54,36 @@ _Row: TypeAlias = tuple[int, FloatArray, float, FloatArray, float]
 # Largest violation of a limit by a point before its rounding errors are removed, as a share of the
 # size of the region.
 NEAR = 1e-3
+NO_NORMALS: FloatArray = np.zeros((0, 3))
 
 
 @computed_once
 def extent_of(workspace: Workspace) -> tuple[FloatArray, FloatArray] | None:
     """Return (lows, highs) of a workspace, each (3,), in design units; None if it has no volume."""
-    points = extreme_positions(workspace, np.zeros((0, 3)))
+    points = extremes_of(workspace.limits, workspace.region, workspace.design.reach)
     return (points.min(axis=0), points.max(axis=0)) if len(points) else None
 
 
 @computed_once
 def least_margins(workspace: Workspace) -> FloatArray | None:
     """Return the least |δ1|, |δ2| and |δ3| in a workspace, in design units; None as `extent_of`."""
-    gradients = planes_of_singularity(workspace.rotation)
-    points = extreme_positions(workspace, gradients)
+    gradients, design = planes_of_singularity(workspace.rotation), workspace.design
+    points = extremes_of(workspace.limits, workspace.region, design.reach, gradients)
     if not len(points):
         return None
     least = np.abs(points @ gradients.T).min(axis=0)
-    least[least <= workspace.design.tolerance] = 0.0
+    least[least <= design.tolerance] = 0.0
     return least
 
 
-def extreme_positions(workspace: Workspace, normals: FloatArray) -> FloatArray:
-    """Return positions in a workspace, shape (n, 3), the extreme ones among them.
-
-    They are extreme along the axes and along the normals, shape (m, 3), in the whole workspace and
-    on either side of the planes through a1 with these normals.
-    """
-    return extremes_of(workspace.limits, workspace.region, workspace.design.reach, normals)
-
-
 def extremes_of(
-    limits: Sequence[Constraint], region: Region, reach: float, normals: FloatArray
+    limits: Sequence[Constraint], region: Region, reach: float, normals: FloatArray = NO_NORMALS
 ) -> FloatArray:
-    """Return `extreme_positions` of the region within limits, of a mechanism with a reach."""
+    """Return positions (n, 3) in a region with its limits, the extreme ones among them.
+
+    They are extreme along the axes and along the normals, shape (m, 3), in the whole region and on
+    either side of the planes through a1 with these normals. Tolerances are those of the reach.
+    """
     box = region.box
     if box is None:
         return np.zeros((0, 3))

@@ -30,7 +30,7 @@ from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.margins import planes_of_singularity
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.workspace.extremes import extent_of, extreme_positions, extremes_of, least_margins
+from explorer.workspace.extremes import extent_of, extremes_of, least_margins
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
@@ -46,7 +46,6 @@ STALLING = [
     (decode_design(json.dumps(row["design"]).encode(), "defects_extent.json"), row["lowest_z"])
     for row in read_reference("defects_extent")["workspaces"]
 ]
-NO_NORMALS = np.zeros((0, 3))
 
 
 def at_home(design: Design, rotation: FloatArray | None) -> tuple[Design, FloatArray]:
@@ -185,7 +184,7 @@ def test_extent_is_reached_and_nothing_lies_beyond(case: tuple[str, int]) -> Non
         assert is_proven_empty(limits, 1e-5 * size_of(limits))
         return
     size = size_of(limits)
-    points = extreme_positions(Workspace(design, rotation), NO_NORMALS)
+    points = extremes_of(limits, region_of(limits), design.reach)
     units = [1.0 if isinstance(limit, Cone) else size for limit in limits]
     assert (slacks(limits, points) >= -1e-10 * np.array(units)).all()
     for axis, end in ((axis, end) for axis in range(3) for end in (0, 1)):
@@ -205,9 +204,8 @@ def test_least_margins_are_reached_and_none_is_less(case: tuple[str, int]) -> No
     if least is None:
         return
     size = size_of(limits)
-    reached = np.abs(extreme_positions(Workspace(design, rotation), gradients) @ gradients.T).min(
-        axis=0
-    )
+    points = extremes_of(limits, region_of(limits), design.reach, gradients)
+    reached = np.abs(points @ gradients.T).min(axis=0)
     np.testing.assert_allclose(least, reached, atol=1e-10 * design.reach)
     demanded = design.limits.margin or 0.0
     for gradient, value in zip(gradients, least.tolist(), strict=True):
@@ -274,7 +272,7 @@ def test_extremes_of_balls_that_meet_by_symmetry_are_found(
         for radius, inside in ((longest, True), (shortest, False))
         if radius
     ]
-    points = extremes_of(limits, region_of(limits), longest, NO_NORMALS)
+    points = extremes_of(limits, region_of(limits), longest)
     assert slacks(limits, points).min() >= -1e-6
     # On the axis all six legs are longest.
     highest = math.sqrt(longest**2 - abs(centres[0]) ** 2)
