@@ -76,7 +76,7 @@ def candidates(terms: Terms, seed: int) -> Iterator[tuple[FloatArray, FloatArray
     looks = [poses[:3], poses[:9], poses]
     while True:
         shares = random.random((BLOCK, count))
-        x = np.ones((BLOCK, len(m.VARIABLES)))
+        x = np.ones((BLOCK, m.VARIABLES))
         x[:, m.TX : m.TILT] = 0.0
         x[:, :count] = LOWS[:count] + (HIGHS - LOWS)[:count] * shares
         sizes = terms.spread ** random.random((BLOCK, 1))

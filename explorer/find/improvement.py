@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,48 +37,42 @@ LENGTH, FORCE, STIFFNESS, ERROR, SINGULAR, CLEARANCE, RATIO, MISS = range(8)
 equal actuators; one over the transmission index; one over the least distance of legs; the largest
 ratio of the lengths of a leg; the amount by which one demand is missed."""
 
-LOWERED: Mapping[int, Callable[[m.MachineValues], list[Any]]] = MappingProxyType(
-    {
-        # The rate of leg 1 does not move a tool at b4.
-        FORCE: lambda at: [0.5 * np.log(each * each + 1e-9) for each in at.tool_speeds],
-        STIFFNESS: lambda at: [np.log(sum(each * each for each in at.tool_speeds))],
-        ERROR: lambda at: [np.log(sum(at.tool_speeds))],
-        SINGULAR: lambda at: [-np.log(each) for each in at.transmissions],
-        CLEARANCE: lambda at: [-np.log(m.size(each)) for each in at.distances],
-    }
-)
+LOWERED: Mapping[int, Callable[[m.MachineValues], list[Any]]] = {
+    # The rate of leg 1 does not move a tool at b4.
+    FORCE: lambda at: [0.5 * np.log(each * each + 1e-9) for each in at.tool_speeds],
+    STIFFNESS: lambda at: [np.log(sum(each * each for each in at.tool_speeds))],
+    ERROR: lambda at: [np.log(sum(at.tool_speeds))],
+    SINGULAR: lambda at: [-np.log(each) for each in at.transmissions],
+    CLEARANCE: lambda at: [-np.log(m.size(each)) for each in at.distances],
+}
 """The logarithms of these quantities, but for the longest leg."""
 
-WEIGHTS: Mapping[Preference, Mapping[int, float]] = MappingProxyType(
-    {
-        # Of needs in the tests, legs a fifth longer than the shortest ones (355 to 434 mm, 229 to
-        # 272 mm) lower the force from 18.8 and 12 N to 1.9 N for each newton, and raise the index
-        # from 0.06 and 0.07 to 0.59 and 0.53; weights of 0.5 take 46 % longer legs for 0.81.
-        "balanced": {LENGTH: 1.0, FORCE: 0.15, SINGULAR: 0.15},
-        "small": {LENGTH: 1.0},
-        "little-force": {LENGTH: 0.2, FORCE: 1.0},
-        "stiff": {LENGTH: 0.2, STIFFNESS: 1.0},
-        "precise": {LENGTH: 0.2, ERROR: 1.0},
-        "far-from-singular": {LENGTH: 0.2, SINGULAR: 1.0},
-        "easy-to-build": {LENGTH: 1.0, CLEARANCE: 0.5, SINGULAR: 0.1},
-    }
-)
+WEIGHTS: Mapping[Preference, Mapping[int, float]] = {
+    # Of needs in the tests, legs a fifth longer than the shortest ones (355 to 434 mm, 229 to
+    # 272 mm) lower the force from 18.8 and 12 N to 1.9 N for each newton, and raise the index
+    # from 0.06 and 0.07 to 0.59 and 0.53; weights of 0.5 take 46 % longer legs for 0.81.
+    "balanced": {LENGTH: 1.0, FORCE: 0.15, SINGULAR: 0.15},
+    "small": {LENGTH: 1.0},
+    "little-force": {LENGTH: 0.2, FORCE: 1.0},
+    "stiff": {LENGTH: 0.2, STIFFNESS: 1.0},
+    "precise": {LENGTH: 0.2, ERROR: 1.0},
+    "far-from-singular": {LENGTH: 0.2, SINGULAR: 1.0},
+    "easy-to-build": {LENGTH: 1.0, CLEARANCE: 0.5, SINGULAR: 0.1},
+}
 """Exponents of the quantities whose product a preference makes least."""
 
-RELAXED: Mapping[str, str] = MappingProxyType(
-    {
-        "swing_deg": "swing",
-        "legs.push_n": "force",
-        "legs.apart_mm": "clearance",
-        "legs.speed_mm_s": "speed",
-        "transmission": "transmission index",
-        "error_mm": "error",
-        "deflection_mm": "deflection",
-    }
-)
+RELAXED: Mapping[str, str] = {
+    "swing_deg": "swing",
+    "legs.push_n": "force",
+    "legs.apart_mm": "clearance",
+    "legs.speed_mm_s": "speed",
+    "transmission": "transmission index",
+    "error_mm": "error",
+    "deflection_mm": "deflection",
+}
 """Fields of a requirement with the demands that they limit."""
 
-GROWING = MappingProxyType({"tilt_deg": m.TILT, "box_mm": m.SIZE})
+GROWING: Mapping[str, int] = {"tilt_deg": m.TILT, "box_mm": m.SIZE}
 """Fields of a requirement with the variables that are factors on them."""
 
 # Weight of the longest leg beside a demand that is missed as little as possible.
@@ -316,7 +309,7 @@ SHORT, HOPELESS, LONG = 3, 0.02, 10
 def _ranges(search: Improvement, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return lows and highs of the variables and of the bounds of an improvement."""
     farthest = FARTHEST * search.terms.spread
-    lows, highs = np.full(len(m.VARIABLES), -farthest), np.full(len(m.VARIABLES), farthest)
+    lows, highs = np.full(m.VARIABLES, -farthest), np.full(m.VARIABLES, farthest)
     for index in (m.A3Y, m.B1Y):
         (lows if x[index] > 0.0 else highs)[index] = math.copysign(LEAST, x[index])
     for index in (m.BOX_YAW, m.YAW, m.PITCH, m.ROLL):

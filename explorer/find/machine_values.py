@@ -1,6 +1,6 @@
 """Values of machines in poses, for arrays of machines and of poses at once.
 
-A machine is a row of numbers, `VARIABLES`, with lengths over the diagonal of the required box; a
+A machine is a row of `VARIABLES` numbers, with lengths over the diagonal of the required box; a
 pose is a place in the box with a tilt. All formulas are analytic in the variables, so that complex
 numbers pass through them: with an imaginary step far below rounding the imaginary part of a result
 over that step is its derivative, to the last digits (W. Squire and G. Trapp, "Using complex
@@ -27,20 +27,12 @@ from explorer.numerics.vectors import cross3, dot3
 Vec = tuple[Any, Any, Any]
 """The x, y and z of vectors, arrays or numbers."""
 
-VARIABLES = (
-    *("a3x", "a3y", "b1x", "b1y", "b2", "b3"),
-    *("home x", "home y", "home z"),
-    "yaw of the box",
-    *("yaw", "pitch", "roll"),
-    *("tool x", "tool y", "tool z"),
-    *("tilt", "size of the box"),
-)
-"""The variables: those of a design; the tool at home, which is the centre of the box; angles of the
-box and of home in radians; the tool in the platform; factors on all tilts and on the box."""
+VARIABLES = 18
+"""Number of variables: those of a design; the tool at home, which is the centre of the box; angles
+of the box and of home in radians; the tool in the platform; factors on all tilts and on the box."""
 
-A3X, A3Y, B1X, B1Y, B2, B3, HX, HY, HZ, BOX_YAW, YAW, PITCH, ROLL, TX, TY, TZ, TILT, SIZE = range(
-    len(VARIABLES)
-)
+A3X, A3Y, B1X, B1Y, B2, B3, HX, HY, HZ = range(9)
+BOX_YAW, YAW, PITCH, ROLL, TX, TY, TZ, TILT, SIZE = range(9, VARIABLES)
 
 SWINGING = (0, 3, 0, 1, 2, 3)
 """The legs, from 0, whose swings are bounded at a1, a3, b1, b2, b3 and b4."""

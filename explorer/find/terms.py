@@ -156,7 +156,7 @@ class Terms:
 def row_of(design: Design, terms: Terms) -> FloatArray:
     """Return a design as a machine, shape (18,), with home's tool at the centre of the box."""
     scale, home = terms.scale_mm / design.unit_mm, design.home_pose
-    x = np.ones(len(m.VARIABLES))
+    x = np.ones(m.VARIABLES)
     x[: m.HX] = np.array(design.variables) / scale
     x[m.HX : m.BOX_YAW] = np.divide(tool_position(home, design.tool.position), scale)
     x[m.BOX_YAW] = math.radians(design.required_yaw)

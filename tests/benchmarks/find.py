@@ -80,7 +80,7 @@ def _evolve(requirement: Requirement) -> tuple[float, bool]:
     poses = standard_poses(terms.tilt)
 
     def row(values: Any) -> FloatArray:
-        x = np.ones(len(VARIABLES))
+        x = np.ones(VARIABLES)
         x[:TX], x[TX:TILT] = values, 0.0
         return x
 

@@ -52,7 +52,7 @@ EVERYTHING = Requirement(
 
 def random_machine(random: np.random.Generator, *, tool: bool) -> FloatArray:
     """Return a machine that no limit bounds, with the box above the base."""
-    x = np.ones(len(m.VARIABLES))
+    x = np.ones(m.VARIABLES)
     x[: m.HX] = 1.5 * random.normal(size=6)
     x[m.HX : m.BOX_YAW] = *0.3 * random.normal(size=2), 1.5 + random.random()
     x[m.BOX_YAW : m.TX] = random.normal(size=4) * [0.6, 0.6, 0.2, 0.2]
