@@ -119,7 +119,7 @@ class ClearanceDemand:
         for limit, far in zip(limits, outside, strict=True):
             shares = by_leaving[rows] * np.exp(sharp * far[rows] - out[rows])[:, None]
             gradients -= shares.T @ state.slack_slopes(limit, p[rows])
-        return Measured(least / sharp / self.clearance - RESERVE, gradients / self.clearance)
+        return least / sharp / self.clearance - RESERVE, gradients / self.clearance
 
     def worst(self, state: SearchState) -> tuple[float, str]:
         """Return the least of the values that `measure` bounds from below, and its pair."""

@@ -25,11 +25,8 @@ MET = 1e-8
 RESERVE = 3e-8
 
 
-class Measured(NamedTuple):
-    """The values (m,) of m demands and their derivatives (m, n) by the n scaled variables."""
-
-    values: FloatArray
-    gradients: FloatArray
+Measured = tuple[FloatArray, FloatArray]
+"""The values (m,) of m demands and their derivatives (m, n) by the n scaled variables."""
 
 
 class SearchDemand(NamedTuple):
@@ -53,7 +50,7 @@ def volume_demand(volume: float, *, is_equality: bool) -> SearchDemand:
 
     def measure(state: SearchState) -> Measured:
         root, gradient = state.volume_root(volume)
-        return Measured(np.array([root - 1.0]), gradient[None, :])
+        return np.array([root - 1.0]), gradient[None, :]
 
     return SearchDemand((CATALOGUE["volume"].label,), measure, is_equality=is_equality)
 
@@ -63,7 +60,7 @@ def reach_demand(reach: float) -> SearchDemand:
 
     def measure(state: SearchState) -> Measured:
         value, gradient = state.longest_leg
-        return Measured(np.array([1.0 - value / reach]), -gradient[None, :] / reach)
+        return np.array([1.0 - value / reach]), -gradient[None, :] / reach
 
     return SearchDemand((CATALOGUE["longest_leg"].label,), measure)
 
@@ -82,13 +79,13 @@ def side_demands(start: SearchState) -> list[SearchDemand]:
         rows = state.rows(("a3y", "b1y", "b3"))
         rows[2] -= state.rows(("b2",))[0]
         values = signs * _distances(state) - least
-        return Measured(values / size, signs[:, None] * rows / size)
+        return values / size, signs[:, None] * rows / size
 
     def measure_gap(state: SearchState) -> Measured:
         u, span = state.rotation[:, 0], state.design.b3 - state.design.b2
         slope = state.along({"b3": float(u[0]), "b2": -float(u[0]), YAW: -span * float(u[1])})
         value = side * _gap(state) - state.design.limits.gap
-        return Measured(np.array([value / size]), side * slope[None, :] / size)
+        return np.array([value / size]), side * slope[None, :] / size
 
     found: list[SearchDemand] = []
     if least > 0.0:
