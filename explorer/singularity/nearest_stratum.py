@@ -15,7 +15,6 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -73,30 +72,28 @@ _GUIDE_ALONG, _LINE_ALONG = ("xz", ("",)), ("zx", ("",))
 _PARALLEL_PLANES, _PARALLEL_LINES = ("z", ("", "x")), ("x", ("", "z"))
 _PARALLEL_FLAGS = ("", ("", "x", "y", "z"))
 
-_CLOSURES: Mapping[Stratum, _Closure] = MappingProxyType(
-    {
-        (3, 4, 1, 2): _Closure(*_FREE, "node"),
-        (2, 4, 3, 1): _Closure(*_FREE, "u"),
-        (4, 1, 3, 2): _Closure(*_FREE, "guide"),
-        (1, 4, 3, 2): _Closure(*_FREE, "a1"),
-        (3, 2, 4, 1): _Closure(*_GUIDE_ALONG, "platform"),
-        (2, 3, 4, 1): _Closure(*_GUIDE_ALONG, "u"),
-        (3, 1, 4, 2): _Closure(*_GUIDE_ALONG, "guide"),
-        (1, 3, 4, 2): _Closure(*_GUIDE_ALONG, "a1"),
-        (4, 2, 1, 3): _Closure(*_LINE_ALONG, "base"),
-        (2, 4, 1, 3): _Closure(*_LINE_ALONG, "u"),
-        (4, 1, 2, 3): _Closure(*_LINE_ALONG, "guide"),
-        (1, 4, 2, 3): _Closure(*_LINE_ALONG, "a1"),
-        (3, 2, 1, 4): _Closure(*_PARALLEL_PLANES, "base"),
-        (2, 3, 1, 4): _Closure(*_PARALLEL_PLANES, "u"),
-        (3, 1, 2, 4): _Closure(*_PARALLEL_PLANES, "guide"),
-        (1, 3, 2, 4): _Closure(*_PARALLEL_PLANES, "a1"),
-        (2, 1, 4, 3): _Closure(*_PARALLEL_LINES, "guide"),
-        (1, 2, 4, 3): _Closure(*_PARALLEL_LINES, "a1"),
-        (2, 1, 3, 4): _Closure(*_PARALLEL_FLAGS, "guide"),
-        (1, 2, 3, 4): _Closure(*_PARALLEL_FLAGS, "a1"),
-    }
-)
+_CLOSURES: Mapping[Stratum, _Closure] = {
+    (3, 4, 1, 2): _Closure(*_FREE, "node"),
+    (2, 4, 3, 1): _Closure(*_FREE, "u"),
+    (4, 1, 3, 2): _Closure(*_FREE, "guide"),
+    (1, 4, 3, 2): _Closure(*_FREE, "a1"),
+    (3, 2, 4, 1): _Closure(*_GUIDE_ALONG, "platform"),
+    (2, 3, 4, 1): _Closure(*_GUIDE_ALONG, "u"),
+    (3, 1, 4, 2): _Closure(*_GUIDE_ALONG, "guide"),
+    (1, 3, 4, 2): _Closure(*_GUIDE_ALONG, "a1"),
+    (4, 2, 1, 3): _Closure(*_LINE_ALONG, "base"),
+    (2, 4, 1, 3): _Closure(*_LINE_ALONG, "u"),
+    (4, 1, 2, 3): _Closure(*_LINE_ALONG, "guide"),
+    (1, 4, 2, 3): _Closure(*_LINE_ALONG, "a1"),
+    (3, 2, 1, 4): _Closure(*_PARALLEL_PLANES, "base"),
+    (2, 3, 1, 4): _Closure(*_PARALLEL_PLANES, "u"),
+    (3, 1, 2, 4): _Closure(*_PARALLEL_PLANES, "guide"),
+    (1, 3, 2, 4): _Closure(*_PARALLEL_PLANES, "a1"),
+    (2, 1, 4, 3): _Closure(*_PARALLEL_LINES, "guide"),
+    (1, 2, 4, 3): _Closure(*_PARALLEL_LINES, "a1"),
+    (2, 1, 3, 4): _Closure(*_PARALLEL_FLAGS, "guide"),
+    (1, 2, 3, 4): _Closure(*_PARALLEL_FLAGS, "a1"),
+}
 """The closures of all strata of codimension two or more."""
 
 

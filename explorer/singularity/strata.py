@@ -16,7 +16,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from functools import cache
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -124,20 +123,18 @@ Condition = tuple[int, int, int]
 OF_INCIDENCES: tuple[Stratum, ...] = ((3, 4, 2, 1), (4, 2, 3, 1), (4, 3, 1, 2))
 """The strata of codimension one, in which δ1, δ2 or δ3 alone vanishes."""
 
-WORDS: Mapping[Condition, str] = MappingProxyType(
-    {
-        (1, 3, 1): INCIDENCES[0],
-        (2, 2, 1): INCIDENCES[1],
-        (3, 1, 1): INCIDENCES[2],
-        (1, 2, 1): "a1 on the line b2b3",
-        (2, 1, 1): "b4 on the guide",
-        (2, 3, 2): "the guide on the platform plane",
-        (3, 2, 2): "the line b2b3 on the base plane",
-        (1, 1, 1): "a1 and b4 coinciding",
-        (2, 2, 2): "the lines coinciding",
-        (3, 3, 3): "the planes coinciding",
-    }
-)
+WORDS: Mapping[Condition, str] = {
+    (1, 3, 1): INCIDENCES[0],
+    (2, 2, 1): INCIDENCES[1],
+    (3, 1, 1): INCIDENCES[2],
+    (1, 2, 1): "a1 on the line b2b3",
+    (2, 1, 1): "b4 on the guide",
+    (2, 3, 2): "the guide on the platform plane",
+    (3, 2, 2): "the line b2b3 on the base plane",
+    (1, 1, 1): "a1 and b4 coinciding",
+    (2, 2, 2): "the lines coinciding",
+    (3, 3, 3): "the planes coinciding",
+}
 """The incidence at which r_ij is at least r, by (i, j, r)."""
 
 
@@ -179,14 +176,12 @@ def incidences(stratum: Stratum) -> tuple[int, ...]:
     )
 
 
-COVERED: Mapping[Stratum, tuple[Stratum, ...]] = MappingProxyType(
-    {
-        upper: tuple(
-            lower
-            for lower in STRATA
-            if inversions(lower) == inversions(upper) - 1 and is_below(lower, upper)
-        )
-        for upper in STRATA
-    }
-)
+COVERED: Mapping[Stratum, tuple[Stratum, ...]] = {
+    upper: tuple(
+        lower
+        for lower in STRATA
+        if inversions(lower) == inversions(upper) - 1 and is_below(lower, upper)
+    )
+    for upper in STRATA
+}
 """The strata of one dimension less in the closure of each: the edges of the Hasse diagram."""

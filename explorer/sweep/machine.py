@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Literal
 
 import msgspec
@@ -76,33 +75,30 @@ class MachineVariable:
         )
 
 
-_TOOL = {
-    f"tool_{name}": MachineVariable(
-        f"{name} of the tool point in the platform", "units", "tool", "position", axis, "any"
-    )
-    for axis, name in enumerate("xyz")
+MACHINE: Mapping[str, MachineVariable] = {
+    "payload_mass": MachineVariable(
+        "mass of the payload", "kg", "payload", "mass_kg", bound="not negative"
+    ),
+    "payload_force": MachineVariable(
+        "force of any direction at the tool", "N", "payload", "force_n", bound="not negative"
+    ),
+    **{
+        f"tool_{name}": MachineVariable(
+            f"{name} of the tool point in the platform", "units", "tool", "position", axis, "any"
+        )
+        for axis, name in enumerate("xyz")
+    },
+    "actuator_limit": MachineVariable(
+        "one limit of push and pull for all six actuators", "N", "actuators", "push_n"
+    ),
+    "strut_limit": MachineVariable(
+        "largest bending moment of a strut", "N m", "struts", "moment_nm"
+    ),
+    "guide_force": MachineVariable(
+        "largest force across the guide at a carriage", "N", "guide", "force_n"
+    ),
+    "guide_moment": MachineVariable(
+        "largest moment on the guide at a carriage", "N m", "guide", "moment_nm"
+    ),
 }
-MACHINE: Mapping[str, MachineVariable] = MappingProxyType(
-    {
-        "payload_mass": MachineVariable(
-            "mass of the payload", "kg", "payload", "mass_kg", bound="not negative"
-        ),
-        "payload_force": MachineVariable(
-            "force of any direction at the tool", "N", "payload", "force_n", bound="not negative"
-        ),
-        **_TOOL,
-        "actuator_limit": MachineVariable(
-            "one limit of push and pull for all six actuators", "N", "actuators", "push_n"
-        ),
-        "strut_limit": MachineVariable(
-            "largest bending moment of a strut", "N m", "struts", "moment_nm"
-        ),
-        "guide_force": MachineVariable(
-            "largest force across the guide at a carriage", "N", "guide", "force_n"
-        ),
-        "guide_moment": MachineVariable(
-            "largest moment on the guide at a carriage", "N m", "guide", "moment_nm"
-        ),
-    }
-)
 """The variables by name; all else of a machine is that of the study's design."""
