@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -19,7 +20,6 @@ from explorer.measures.blocks import block as kinds
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
-from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.folds import FOLDS, to_folds
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
@@ -28,14 +28,15 @@ from explorer.numerics.number_text import format_ascii
 
 
 def write_json(answer: Mapping[str, object]) -> None:
-    """Write the one JSON object of a command: plain values, arrays, designs, paths, and no NaN."""
-    write(json.dumps(answer, allow_nan=False, default=_plain) + "\n")
+    """Write the one JSON object of a command: plain values, structs, arrays and paths.
+
+    Numbers that are not finite, such as the clearance of legs that share a joint, are null.
+    """
+    write(json.dumps(json.loads(msgspec.json.encode(answer, enc_hook=_plain))) + "\n")
 
 
 def _plain(value: Any) -> object:
-    """Convert a value that JSON cannot hold: a design, a path or an array."""
-    if isinstance(value, Design):
-        return json.loads(encode_design(value))
+    """Convert a value that JSON cannot hold: a path or an array."""
     return str(value) if isinstance(value, PurePath) else value.tolist()
 
 
@@ -65,11 +66,6 @@ def folds_in_degrees(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     folds = to_folds(position, rotation)
     folds[..., 1:] = np.degrees(folds[..., 1:])
     return folds
-
-
-def finite(value: float) -> float | None:
-    """Return a number, or None for the infinite clearance of legs that share a joint."""
-    return value if math.isfinite(value) else None
 
 
 def limits_json(snapshot: Snapshot) -> dict[str, object]:

@@ -96,8 +96,8 @@ def _pose_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
         "pairs": [
             {
                 "legs": pair,
-                "distance": output.finite(float(legs.distance[index])),
-                "clearance": output.finite(float(legs.clearance[index])),
+                "distance": legs.distance[index],
+                "clearance": legs.clearance[index],
                 "points": legs.points[index],
                 "collides": legs.clearance[index] < 0.0,
             }
@@ -120,8 +120,8 @@ def _move_json(move: moves.MoveClearance, start: Snapshot, end: Snapshot) -> dic
         "pairs": [
             {
                 "legs": pair,
-                "clearance": output.finite(float(move.clearance[index])),
-                "bound": output.finite(float(move.bound[index])),
+                "clearance": move.clearance[index],
+                "bound": move.bound[index],
                 "share": move.share[index],
                 **place(pose),
                 "points": move.points[index],

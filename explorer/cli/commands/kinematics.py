@@ -322,7 +322,7 @@ def _tool_json(snapshot: Snapshot, tool: Triple) -> dict[str, object]:
         **output.tool_json(snapshot.pose, tool),
         "tool_inverse_condition": _condition_at(snapshot, tool),
         "tool_ellipsoids": {
-            name: {"gain": [*map(output.finite, each.gain.tolist())], "axes": each.axes.T}
+            name: {"gain": each.gain, "axes": each.axes.T}
             for name, each in (("translation", found.translation), ("rotation", found.rotation))
         },
     }

@@ -143,11 +143,8 @@ def _number_of_designs(found: FoundDesigns) -> str:
 
 def demand_json(design: Design, demand: DemandCheck) -> dict[str, object]:
     """Return a demand as plain values, with the position of the tool in its worst pose."""
-    numbers = {name: output.finite(getattr(demand, name)) for name in ("worst", "limit", "spare")}
     return {
-        **output.attributes(demand, "name kept"),
-        **numbers,
-        "unit": demand.unit,
+        **output.attributes(demand, "name kept worst limit spare unit"),
         "position_mm": None if demand.pose is None else _tool_mm(design, demand.pose),
         "quaternion": None if demand.pose is None else demand.pose.quaternion,
         "proven": demand.proven,
@@ -163,7 +160,7 @@ def found_json(files: Sequence[Path | None], found: FoundDesigns) -> dict[str, o
     """Return the answer of a search as plain values; what is impossible is what binds."""
     return {
         "designs": [_design_json(*pair) for pair in zip(files, found.designs, strict=True)],
-        "bound_mm": output.finite(found.bound_mm),
+        "bound_mm": found.bound_mm,
         "binding": [*found.impossible, *found.binding],
         "nearest": [output.attributes(each, "demand value unit") for each in found.nearest],
     }

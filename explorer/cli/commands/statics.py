@@ -31,7 +31,6 @@ from explorer.statics.reactions import LIMITED
 from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
 B4: Triple = (0.0, 0.0, 0.0)
-PARTS = ("guide", "struts", "actuators")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +128,7 @@ def _forces_json(
         # What the payload's force of any direction may add either way.
         "process": dict(zip(LIMITED, reactions.spread.tolist(), strict=True)),
         "shares": dict(zip(LIMITED, found.shares.tolist(), strict=True)),
-        "largest_payload": output.finite(found.largest_payload),
+        "largest_payload": found.largest_payload,
         "largest_force_by_all_parts": 1.0 / by_unit if by_unit else None,
         "worst_force": added
         and {
@@ -198,7 +197,6 @@ class AccuracyCommand(options.TypicalOptions, LoadOptions):
 
 def _accuracy_json(found: loaded.ToolPrecision) -> dict[str, object]:
     principal, alone = found.principal, found.alone
-    shares = [output.finite(float(share)) for share in found.shares]
     totals: dict[str, float] = {}
     for group, sources in loaded.GROUPS.items():
         suffix = "" if group == "actuators" else f"_of_{group}"
@@ -209,7 +207,7 @@ def _accuracy_json(found: loaded.ToolPrecision) -> dict[str, object]:
     return {
         "compliance": found.compliance,
         "deflection": found.deflection,
-        "deflection_shares": dict(zip(PARTS, shares, strict=True)),
+        "deflection_shares": found.shares._asdict(),
         "principal_compliances": output.attributes(principal, names),
         **totals,
         "displacement_by_actuator": alone.displacement[loaded.BY_ACTUATORS],
@@ -331,7 +329,7 @@ def _budget_json(
         "parts": budgets.PARTS,
         "ranking": [accuracy.SOURCES[k] for k in costs.ranking.tolist()],
         **output.attributes(costs, f"{names} {totals}"),
-        "tolerances": found and [*map(output.finite, found.tolerances.tolist())],
+        "tolerances": found and found.tolerances,
         "effort": found and found.effort,
         "least_effort": found and found.least_effort,
     }

@@ -230,15 +230,9 @@ class _Answer:
     def add_accessible(self, found: accessible.AccessibleWorkspace) -> None:
         """Add the accessible workspace, and what each pair of legs blocks."""
         self.values |= {
-            **output.attributes(found, "accessible_volume accessible_node_count"),
-            "harmless_radius": output.finite(found.harmless_radius),
+            **output.attributes(found, "accessible_volume accessible_node_count harmless_radius"),
             "pairs": [
-                {
-                    "legs": pair.legs,
-                    "clearance": output.finite(pair.clearance),
-                    "bound": output.finite(pair.bound),
-                    "blocked_volume": pair.blocked_volume,
-                }
+                output.attributes(pair, "legs clearance bound blocked_volume")
                 for pair in found.pairs
             ],
             "accessible_solid": _mesh_json(found.solid),
@@ -336,17 +330,14 @@ class OrientationCommand(options.JsonOptions, options.PointOptions):
                 name.replace(" ", "_"): position,
                 **output.attributes(share, "share standard_error orientations"),
                 "torsion": least.torsion,
-                "greatest_tilt": output.finite(least.tilt),
-                "azimuth": output.finite(least.azimuth),
-                "limit": least.limit,
-                "azimuths": by_azimuth.azimuths,
-                "tilts": [*map(output.finite, by_azimuth.tilts.tolist())],
-                "limits": by_azimuth.limits,
+                "greatest_tilt": least.tilt,
+                **output.attributes(least, "azimuth limit"),
+                **output.attributes(by_azimuth, "azimuths tilts limits"),
                 "torsions": by_torsion.torsions,
-                "tilts_by_torsion": [*map(output.finite, by_torsion.tilts.tolist())],
+                "tilts_by_torsion": by_torsion.tilts,
                 "best_torsion": best.torsion,
-                "best_tilt": output.finite(best.tilt),
-                "torsion_range": [output.finite(torsions.low), output.finite(torsions.high)],
+                "best_tilt": best.tilt,
+                "torsion_range": [torsions.low, torsions.high],
                 "torsion_limits": [torsions.low_limit, torsions.high_limit],
                 "home_connected": is_home_connected,
             },
