@@ -214,18 +214,18 @@ def move_clearances(
     end_rotation: ArrayLike,
     *,
     tolerance: float | None = None,
-    tool: ArrayLike | None = None,
 ) -> MoveClearances:
-    """Return the least clearances over straight moves; those of no length are allowed.
+    """Return the least clearances over straight moves of b4; those of no length are allowed.
 
     The ends are positions of b4, shape (..., 3), and rotations from platform to base, (..., 3, 3).
-    The tolerance is that of `move_clearance`, the tool that of `poses_between`.
+    The tolerance of the least clearances is in design units; by default it is a millionth of the
+    reach, or of the longest travel of a leg's end if that is longer.
 
     Raises:
-        InputError: A pose or the tool is not finite, not a rotation, or the tolerance is too small.
+        InputError: A pose is not finite, not a rotation, or the tolerance is too small.
     """
     ends = ends_of_moves(start_position, start_rotation, end_position, end_rotation)
-    bound, least, share, _ = _least_distances(design, *ends, tolerance, math.nan, tool)
+    bound, least, share, _ = _least_distances(design, *ends, tolerance=tolerance)
     radii = radii_of_pairs(design)
     return MoveClearances(bound - radii, least - radii, share)
 
@@ -244,10 +244,11 @@ def pairs_are_clear(
 
     This is much faster than `move_clearances`, since the search ends once the result is certain.
     True is proven, also for a pair that shares a joint. The result may be False if the clearance is
-    exceeded by less than the default tolerance. Arguments and errors are as there.
+    exceeded by less than the default tolerance. The tool is that of `poses_between`, the rest as
+    there.
     """
     ends = ends_of_moves(start_position, start_rotation, end_position, end_rotation)
-    bound, *_ = _least_distances(design, *ends, None, clearance, tool)
+    bound, *_ = _least_distances(design, *ends, target=clearance, tool=tool)
     return np.asarray(bound > radii_of_pairs(design) + clearance)
 
 
@@ -257,7 +258,6 @@ def move_clearance(
     end: Pose,
     *,
     steps: int = 1,
-    tolerance: float | None = None,
     tool: Triple | None = None,
 ) -> MoveClearance:
     """Return the least clearances over a straight move, with the paper's test beside them.
@@ -267,12 +267,10 @@ def move_clearance(
         start: Pose at the start of the move.
         end: Pose at its end; the platform turns about one axis, the shorter way.
         steps: Number of steps of the paper's test.
-        tolerance: Tolerance of the least clearances, in design units; by default a millionth
-            of the reach, or of the longest travel of a leg's end if that is longer.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
 
     Raises:
-        InputError: The move has no length or no steps, or the tolerance is too small.
+        InputError: The move has no length or no steps.
     """
     if steps < 1:
         raise InputError(f"a move has at least one step; got {steps}")
@@ -284,7 +282,7 @@ def move_clearance(
             "same orientation"
         )
     ends = ends_of_moves(start.position, start.rotation, end.position, end.rotation)
-    bound, least, share, tolerances = _least_distances(design, *ends, tolerance, math.nan, tool)
+    bound, least, share, tolerances = _least_distances(design, *ends, tool=tool)
     radii = radii_of_pairs(design)
     shares = np.linspace(0.0, 1.0, steps + 1)
     before, after = (poses_between(start, end, at, tool) for at in (shares[:-1], shares[1:]))
@@ -309,9 +307,9 @@ def _least_distances(
     design: Design,
     batch: tuple[int, ...],
     ends: Ends,
-    requested: float | None,
-    target: float,
-    tool: ArrayLike | None,
+    tolerance: float | None = None,
+    target: float = math.nan,
+    tool: ArrayLike | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return lower bounds, least distances, their shares, (..., 6) each, and tolerances (n,).
 
@@ -331,12 +329,12 @@ def _least_distances(
     swing = angle * np.linalg.norm(across, axis=-1).max(axis=-1)
     size = np.maximum(design.reach, np.linalg.norm(moves.step, axis=-1) + swing)
     tolerances = DEFAULT_TOLERANCE * size
-    if requested is not None:
+    if tolerance is not None:
         least_one = SMALLEST_TOLERANCE * float(size.max(initial=design.reach))
-        if not requested >= least_one:
-            least_text, got = format_apart((least_one, requested), 3)
+        if not tolerance >= least_one:
+            least_text, got = format_apart((least_one, tolerance), 3)
             raise InputError(f"the tolerance must be at least {least_text}; got {got}")
-        tolerances = np.full(len(size), requested)
+        tolerances = np.full(len(size), tolerance)
     bound = np.full((len(size), len(PAIRS)), np.inf)
     least, share = bound.copy(), np.zeros(bound.shape)
     targets = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design) + target)

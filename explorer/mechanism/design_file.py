@@ -21,7 +21,7 @@ from explorer.files.json_text import check_unique_fields, located_errors
 from explorer.files.packaged import packaged_files
 from explorer.files.writing import broken_link
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Six, Tolerances
+from explorer.mechanism.machine import Tolerances
 from explorer.mechanism.pose import Triple
 
 # Largest accepted size of a design file, in bytes.
@@ -87,15 +87,11 @@ def load_design(preset_or_file: str) -> Design:
     return decode_design(data, preset_or_file)
 
 
-def _load_presets() -> Mapping[str, Design]:
-    files = packaged_files("presets", ".json")
-    designs = [decode_design(file.read_bytes(), file.name) for file in files]
-    return MappingProxyType({design.name: design for design in designs})
-
-
-PRESETS: Mapping[str, Design] = _load_presets()
+_FILES = packaged_files("presets", ".json")
+PRESETS: Mapping[str, Design] = MappingProxyType(
+    {each.name: each for each in (decode_design(file.read_bytes(), file.name) for file in _FILES)}
+)
 """The designs of both rows of the paper's Table 1, by name."""
-
 
 ERROR = 0.05
 """Typical positioning error of an actuator to either side, in mm."""
@@ -105,9 +101,6 @@ OUTER, INNER = 12.0, 10.0
 """Typical diameters of the struts' tubes, in mm."""
 LENGTH, TILT = 0.1, 0.1
 """Typical tolerances of lengths in mm and of tilts in degrees."""
-
-ERRORS: Six = (ERROR, ERROR, ERROR, ERROR, ERROR, ERROR)
-STIFFNESSES: Six = (STIFFNESS, STIFFNESS, STIFFNESS, STIFFNESS, STIFFNESS, STIFFNESS)
 
 
 def typical_machine(design: Design) -> tuple[Design, tuple[str, ...]]:
@@ -119,10 +112,10 @@ def typical_machine(design: Design) -> tuple[Design, tuple[str, ...]]:
     assumed: list[str] = []
     actuators, struts, tolerances = design.actuators, design.struts, design.tolerances
     if not any(actuators.error_mm):
-        actuators = msgspec.structs.replace(actuators, error_mm=ERRORS)
+        actuators = msgspec.structs.replace(actuators, error_mm=(ERROR,) * 6)
         assumed.append(f"errors of the actuators {ERROR:g} mm")
     if actuators.stiffness_n_mm is None:
-        actuators = msgspec.structs.replace(actuators, stiffness_n_mm=STIFFNESSES)
+        actuators = msgspec.structs.replace(actuators, stiffness_n_mm=(STIFFNESS,) * 6)
         assumed.append(f"stiffness of the actuators {STIFFNESS:g} N/mm")
     if struts.outer_mm is None:
         struts = msgspec.structs.replace(struts, outer_mm=OUTER, inner_mm=INNER)

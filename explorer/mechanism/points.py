@@ -14,8 +14,8 @@ from explorer.numerics.arrays import FloatArray
 Variables = tuple[float, float, float, float, float, float]
 """The design variables X = (a3x, a3y, b1x, b1y, b2, b3), in design units."""
 
-ACROSS = np.array([0.0, 1.0, 1.0])
-"""The part of a vector across the guide, as a factor of its components."""
+IN_LEGS = np.array([(1.0, 1.0, 1.0), (0.0, 1.0, 1.0), (0.0, 1.0, 1.0), (1.0, 1.0, 1.0)])
+"""The parts of vectors that are in the legs, as factors: of 2 and 3 those across the guide."""
 
 
 class AttachmentPoints(NamedTuple):
@@ -34,8 +34,7 @@ class AttachmentPoints(NamedTuple):
 
         Legs 2 and 3 start at their carriages, so they are perpendicular to the guide.
         """
-        legs = (self.b1, self.b2 * ACROSS, self.b3 * ACROSS, self.b4 - self.a3)
-        return np.stack(legs, axis=-2)
+        return np.stack((self.b1, self.b2, self.b3, self.b4 - self.a3), axis=-2) * IN_LEGS
 
 
 def platform_points(variables: Variables) -> FloatArray:

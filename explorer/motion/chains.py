@@ -101,7 +101,7 @@ class Chains:
         The first axis of a universal joint is perpendicular to the leg at home.
         """
         home = design.home_pose
-        points = Configuration(design, home.position, home.rotation).points
+        points = Configuration.at(design, home).points
         side = -1 if home.position[2] < 0.0 else 1
         above = -1 if float(home.rotation[:, 2] @ points.b4) > 0.0 else 1
         along = np.diag([1.0, side, side])
@@ -123,17 +123,15 @@ class Chains:
         Raises:
             InputError: A pose that is not finite or not a rotation.
         """
-        b = Configuration(self.design, position, rotation).points
-        ends = np.stack([b.b1, b.b2, b.b3, b.b4 - b.a3], axis=-2)
-        legs = np.where(_GUIDE[:, None], ends * [0.0, 1.0, 1.0], ends)
-        x, y, z = np.moveaxis(np.einsum("kji,...kj->...ki", self.mounts, legs), -1, 0)
+        c = Configuration(self.design, position, rotation)
+        x, y, z = np.moveaxis(np.einsum("kji,...kj->...ki", self.mounts, c.legs), -1, 0)
         joint_values = np.empty((*x.shape[:-1], len(CHAIN_JOINTS)))
         # Adding zero makes a negative zero positive, so that a leg of no length has the angle zero.
         joint_values[..., _FIRST] = np.arctan2(0.0 - y, z + 0.0)
         across = np.hypot(y, z)
         joint_values[..., _SECOND] = np.arctan2(x, across)[..., [0, 3]]
         joint_values[..., _LENGTHS] = np.hypot(x, across)
-        joint_values[..., _CARRIAGES] = ends[..., [1, 2], 0]
+        joint_values[..., 3], joint_values[..., 6] = c.points.b2[..., 0], c.points.b3[..., 0]
         return joint_values
 
     def places(self, joints: FloatArray, position: ArrayLike, rotation: ArrayLike) -> Places:

@@ -13,11 +13,9 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTH_ROWS, Design
-from explorer.mechanism.points import ACROSS
+from explorer.mechanism.points import IN_LEGS
 from explorer.motion.weights import motion_array
 from explorer.numerics.arrays import FloatArray, dot, rotate
-
-IS_ON_GUIDE = np.array([False, True, True, False])
 
 
 def joint_rates(
@@ -60,8 +58,7 @@ def joint_accelerations(
     velocity = t[..., None, :3] + swing
     of_ends = rate[..., None, :3] + np.cross(turning_rate, arms) + np.cross(turning, swing)
     found = np.array(of_ends[..., 0])
-    velocity, of_ends = velocity[..., LENGTH_ROWS, :], of_ends[..., LENGTH_ROWS, :]
-    velocity = np.where(IS_ON_GUIDE[:, None], velocity * ACROSS, velocity)
+    velocity, of_ends = velocity[..., LENGTH_ROWS, :] * IN_LEGS, of_ends[..., LENGTH_ROWS, :]
     across = velocity - dot(c.leg_directions, velocity)[..., None] * c.leg_directions
     squares, lengths = dot(across, across), c.leg_lengths
     centripetal = np.divide(squares, lengths, out=np.zeros(squares.shape), where=lengths > 0.0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, Design
-from explorer.mechanism.machine import Payload, Six
+from explorer.mechanism.machine import NO_LOAD, Payload, Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.motion.weights import Carried, MovingBodies, carry
@@ -25,8 +25,6 @@ from explorer.statics.reactions import (
     limit_shares,
     reactions,
 )
-
-NO_LOAD: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class WorstForce(NamedTuple):

@@ -21,7 +21,7 @@ from explorer.export.linuxcnc import linuxcnc_files
 from explorer.export.mesh import FORMATS
 from explorer.export.moving_page import moving_page
 from explorer.export.simulation import simulation_mjcf
-from explorer.mechanism.design_file import STIFFNESSES
+from explorer.mechanism.design_file import STIFFNESS
 from explorer.mechanism.machine import Actuators, Payload
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.statics.accuracy import SOURCES
@@ -148,7 +148,7 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     design = msgspec.structs.replace(
         OPTIMAL,
         tool=explorer.Tool((0.5, 1.0, -2.0)),
-        actuators=Actuators(error_mm=(0.05, 0, 0, 0, 0, 0), stiffness_n_mm=STIFFNESSES),
+        actuators=Actuators(error_mm=(0.05, 0, 0, 0, 0, 0), stiffness_n_mm=(STIFFNESS,) * 6),
         tolerances=tolerances,
     )
     out = tmp_path / "model.xml"

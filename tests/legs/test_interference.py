@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pytest
@@ -145,9 +144,11 @@ def test_move_clearance_bound_holds_and_is_nearly_attained(
     radii = (0.1, 0.2, 0.3, 0.4)
     design = limited(design, leg_radii=radii)
     longest = 10.0 * design.reach
-    tolerance = None if share is None else share * longest
-    found = move_clearance(design, start, end, tolerance=tolerance, tool=(x, y, z))
+    found = move_clearance(design, start, end, tool=(x, y, z))
     pairs = ~joined_pairs(design)
+    if share is not None:
+        loose = move_clearances(design, *arrays(start, end), tolerance=share * longest)
+        assert (loose.clearance[pairs] - loose.bound[pairs] <= share * longest * 1.000001).all()
     poses = tool_move(start, end, np.linspace(0.0, 1.0, 501), tool)
     least = leg_clearances(Configuration(design, *poses)).clearance.min(axis=0)[pairs]
     rounding = 1e-12 * longest
@@ -207,16 +208,18 @@ def test_move_clearance_no_length_is_refused() -> None:
         assert move_clearance(OPTIMAL, HOME, end).is_clear
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        *(({"steps": x}, f"at least one step; got {x}") for x in (0, -3)),
-        *(({"tolerance": x}, "tolerance must be at least") for x in (0.0, -1.0, 1e-12, math.nan)),
-    ],
-)
-def test_move_clearance_unusable_option_is_refused(options: dict[str, Any], words: str) -> None:
+@pytest.mark.parametrize("steps", [0, -3])
+def test_move_clearance_unusable_number_of_steps_is_refused(steps: int) -> None:
     end = Pose((9, 5, 9), HOME.quaternion)
-    assert words in refusal(partial(move_clearance, **options), OPTIMAL, HOME, end)
+    words = refusal(partial(move_clearance, steps=steps), OPTIMAL, HOME, end)
+    assert f"at least one step; got {steps}" in words
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, 1e-12, math.nan])
+def test_move_clearances_unusable_tolerance_is_refused(tolerance: float) -> None:
+    ends = arrays(HOME, Pose((9, 5, 9), HOME.quaternion))
+    words = refusal(partial(move_clearances, tolerance=tolerance), OPTIMAL, *ends)
+    assert "tolerance must be at least" in words
 
 
 def closest_points(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:

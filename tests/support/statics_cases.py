@@ -10,7 +10,7 @@ from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import Design, margins, rotation_from_quaternion
-from explorer.motion.rates import IS_ON_GUIDE
+from explorer.mechanism.points import IN_LEGS
 from explorer.motion.weights import (
     AXIS_X,
     FIRST_MOMENT,
@@ -39,7 +39,7 @@ class LegMasses:
     def bodies(self) -> MovingBodies:
         """The legs as bodies; the carriages of legs 1 and 4 do not move."""
         rows = np.zeros((4, 11))
-        carriages = np.where(IS_ON_GUIDE, self.carriages, 0.0)
+        carriages = np.where(IN_LEGS[:, 0], 0.0, self.carriages)
         rows[:, TOTAL] = carriages + self.cylinders + np.array(self.rods)
         rows[:, ROD], rows[:, ROD_CENTRE] = self.rods, self.rod_centres
         rows[:, FIRST_MOMENT] = np.multiply(self.cylinders, self.cylinder_centres)

@@ -81,12 +81,9 @@ class Vector(msgspec.Struct, frozen=True):
         return Column("", self.values, digits=self.digits, span=self.span).texts
 
 
-def quantity(
-    value: float, unit: Unit, digits: int = 4, *, size: float = 0.0, span: float = 0.0
-) -> Number:
-    """Return a number in a unit, given the value, the size and the span in design units."""
-    f = unit.factor
-    return Number(f * value, f" {unit.name}", digits, f * size, f * span)
+def quantity(value: float, unit: Unit, digits: int = 4, *, size: float = 0.0) -> Number:
+    """Return a number in a unit, given the value and the size in design units."""
+    return Number(unit.factor * value, f" {unit.name}", digits, unit.factor * size)
 
 
 def direction(values: Sequence[float]) -> Vector:
