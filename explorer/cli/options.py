@@ -178,9 +178,9 @@ class PointOptions(DesignOptions):
         """Return the tool point in the platform frame, in design units; None for b4."""
         return design.tool.position if self.at == "tool" else None
 
-    def shift(self, design: Design, pose: Pose) -> FloatArray | None:
-        """Return the vector from b4 to the tool in the base frame, shape (3,); None for b4."""
-        return offset_of(design, pose.rotation, "tool") if self.at == "tool" else None
+    def shift(self, design: Design, pose: Pose) -> FloatArray:
+        """Return the vector from b4 to the point in the base frame, shape (3,)."""
+        return offset_of(design, pose.rotation, self.at)
 
 
 def make_pose(

@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
+from textwrap import indent
 from typing import Any
 
 import msgspec
@@ -90,11 +91,6 @@ def table(rows: Sequence[Sequence[str]], align: str) -> str:
         ).rstrip()
         for row in rows
     )
-
-
-def indent(text: str) -> list[str]:
-    """Return the lines of a text, indented by two spaces."""
-    return [f"  {line}" for line in text.splitlines()]
 
 
 def figure(value: float, size: float = 0.0) -> str:
@@ -236,4 +232,4 @@ def _table(block: kinds.Table) -> str:
 def end_lines(design: Design, start: Pose, end: Pose, tool: Triple | None) -> Iterator[str]:
     """Yield the two ends of a move or a path."""
     for name, pose in (("from", start), ("to", end)):
-        yield from (name, *indent(pose_table(design, pose, tool)))
+        yield from (name, indent(pose_table(design, pose, tool), "  "))

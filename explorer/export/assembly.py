@@ -9,8 +9,7 @@ in the frame of its body.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 from explorer.export import mesh, opencascade as cad
 from explorer.files.writing import zip_bytes
@@ -18,19 +17,16 @@ from explorer.mechanism.rgb import Rgb
 from explorer.motion.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.shapes import forms_of
-from explorer.prototype.sizes import Sizes
 
-COLOURS: Mapping[str, Rgb] = MappingProxyType(
-    {
-        "base": (214, 219, 226),
-        "carriage": (238, 119, 51),
-        "cross": (204, 187, 68),
-        "cylinder": (68, 119, 170),
-        "rod": (188, 197, 209),
-        "platform": (34, 136, 51),
-        "ball": (170, 51, 119),
-    }
-)
+COLOURS: Mapping[str, Rgb] = {
+    "base": (214, 219, 226),
+    "carriage": (238, 119, 51),
+    "cross": (204, 187, 68),
+    "cylinder": (68, 119, 170),
+    "rod": (188, 197, 209),
+    "platform": (34, 136, 51),
+    "ball": (170, 51, 119),
+}
 """The colours of the kinds of parts."""
 
 # Decimals of coordinates in 3MF, in millimetres.
@@ -113,16 +109,11 @@ def _stl_zip(prototype: Prototype) -> bytes:
     return zip_bytes({f"{name.replace(' ', '-')}.stl": data for name, data in stl.items()})
 
 
-def exact_parts(sizes: Sizes) -> dict[str, cad.ExactShape]:
-    """Return the parts by name, each in the frame of its body, in millimetres."""
-    return {name: shape for name, _, shape in forms_of(sizes, cad.ExactShapeMaker())}
-
-
 def _step(prototype: Prototype) -> bytes:
     design, home = prototype.design, prototype.design.home_pose
     places = prototype.chains.places_at(home.position, home.rotation)
-    parts = exact_parts(prototype.sizes)
-    bodies = {part.name: part.body_index for part in prototype.parts}
+    forms = forms_of(prototype.sizes, cad.ExactShapeMaker())
+    parts = {name: (body, form.shape) for name, body, form in forms}
     document = cad.Document()
 
     def named(label: Any, name: str) -> Any:
@@ -137,17 +128,17 @@ def _step(prototype: Prototype) -> bytes:
     for name, members in part_groups():
         group = named(document.shapes.NewShape(), name)
         for member in members:
-            label = named(document.shapes.AddShape(parts[member].shape, False), member)
+            body, shape = parts[member]
+            label = named(document.shapes.AddShape(shape, False), member)
             document.set_colour(label, COLOURS[member.partition(" ")[0]])
-            body = bodies[member]
-            place = cad.transform(places.rotation[body], places.origin[body] * design.unit_mm)
+            index = BODIES.index(body)
+            place = cad.transform(places.rotation[index], places.origin[index] * design.unit_mm)
             add(group, label, place, member)
         add(whole, group, cad.occ("gp_Trsf")(), name)
     document.shapes.UpdateAssemblies()
     return document.step()
 
 
-FORMATS: Mapping[str, Callable[[Prototype], bytes]] = MappingProxyType(
-    {"3mf": _3mf, "glb": _glb, "stl-zip": _stl_zip, "step": _step}
-)
+_Writer: TypeAlias = Callable[[Prototype], bytes]
+FORMATS: Mapping[str, _Writer] = {"3mf": _3mf, "glb": _glb, "stl-zip": _stl_zip, "step": _step}
 """The writer of each format."""

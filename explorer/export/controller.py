@@ -7,7 +7,7 @@ the limits; what is filled in here are the numbers of the design and the words a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from string import Template
 
 import numpy as np
@@ -70,15 +70,17 @@ def kernel_files(design: Design, machine: BuiltMachine | None = None) -> dict[st
             for bit, (name, text) in enumerate(zip(LIMIT_NAMES, words + pair_words, strict=True))
         ),
     }
-    return {
-        name: Template(read_template(f"{name}.in")).substitute(fields).encode()
-        for name in KERNEL_FILES
-    }
+    return {name: fill_template(f"{name}.in", fields) for name in KERNEL_FILES}
 
 
 def read_template(file: str) -> str:
     """Return the text of a file of the folder `templates`."""
     return packaged_file("export/templates", file).read_text("utf-8")
+
+
+def fill_template(file: str, fields: Mapping[str, object]) -> bytes:
+    """Return a file of the folder `templates` with fields filled in."""
+    return Template(read_template(file)).substitute(fields).encode()
 
 
 def limit_rows(design: Design) -> tuple[FloatArray, FloatArray, list[str]]:

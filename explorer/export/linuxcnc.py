@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
-from string import Template
 
 import numpy as np
 
 from explorer import __version__
 from explorer.errors import NoAnswerError
-from explorer.export.controller import LIMIT_NAMES, kernel_files, read_template
+from explorer.export.controller import LIMIT_NAMES, fill_template, kernel_files
 from explorer.mechanism.built_machine import BuiltMachine
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, JOINTS, Design
@@ -109,10 +108,7 @@ def linuxcnc_files(design: Design, machine: BuiltMachine | None = None) -> dict[
             for index, (name, row, at) in enumerate(zip(JOINTS, joints, home, strict=True))
         ),
     }
-    own = {
-        name: Template(read_template(f"linuxcnc/{name}.in")).substitute(fields).encode()
-        for name in LINUXCNC_FILES
-    }
+    own = {name: fill_template(f"linuxcnc/{name}.in", fields) for name in LINUXCNC_FILES}
     return own | kernel_files(design, machine)
 
 

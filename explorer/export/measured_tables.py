@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from explorer.calibration.measurement import Kind, Measurement
 from explorer.errors import InputError
 from explorer.export.pose_tables import PLANE, SIGMA, TARGETS, PoseTable, read_joints, read_poses
-from explorer.export.tables import length_heads
+from explorer.export.tables import csv_text, length_heads
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
@@ -62,13 +62,12 @@ def joints_table(poses: Configuration, setup: Measurement) -> str:
 
     Planes of a gauge, if they are several, have their numbers.
     """
-    rows = [[str(1 + k), *map(repr, row)] for k, row in enumerate(poses.joints.tolist())]
-    rows.insert(0, ["line", *length_heads(JOINTS, poses.design.unit_mm)])
+    head = ["line", *length_heads(JOINTS, poses.design.unit_mm)]
+    rows = [[k, *row] for k, row in enumerate(poses.joints.tolist(), 1)]
     if len(setup.base) > 1:
-        numbers: list[int] = (1 + np.resize(setup.plane, len(rows) - 1)).tolist()
-        for row, cell in zip(rows, (PLANE, *numbers), strict=True):
-            row.append(str(cell))
-    return "\n".join([*map(",".join, rows), ""])
+        planes = 1 + np.resize(setup.plane, len(rows))
+        head, rows = [*head, PLANE], [[*row, k] for row, k in zip(rows, planes, strict=True)]
+    return csv_text(head, rows)
 
 
 def kind_of(table: PoseTable) -> Kind:

@@ -14,8 +14,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import msgspec
 import numpy as np
@@ -189,19 +188,17 @@ class ThreeMfModel:
         return bytes(writer.WriteToBuffer())
 
 
-COLOURS: Mapping[str, Rgb] = MappingProxyType(
-    {
-        "l1": (68, 119, 170),
-        "d2": (102, 204, 238),
-        "d4": (34, 136, 51),
-        "l4": (204, 187, 68),
-        "d1": (238, 119, 51),
-        "d3": (238, 153, 102),
-        "box": (187, 187, 187),
-        "margin": (238, 102, 119),
-        "swing": (170, 51, 119),
-    }
-)
+COLOURS: Mapping[str, Rgb] = {
+    "l1": (68, 119, 170),
+    "d2": (102, 204, 238),
+    "d4": (34, 136, 51),
+    "l4": (204, 187, 68),
+    "d1": (238, 119, 51),
+    "d3": (238, 153, 102),
+    "box": (187, 187, 187),
+    "margin": (238, 102, 119),
+    "swing": (170, 51, 119),
+}
 """The colour of a limit by the first word of its name, distinct with colour-vision deficiencies."""
 
 HULL_COLOUR: Rgb = (153, 170, 187)
@@ -327,7 +324,6 @@ def _join_numbers(values: Iterable[float]) -> str:
     return " ".join(map(repr, values))
 
 
-FORMATS: Mapping[str, Callable[[Solid, Design, str], bytes]] = MappingProxyType(
-    {"3mf": _3mf, "stl": _stl, "glb": _glb, "obj": _obj, "ply": _ply}
-)
+_Writer: TypeAlias = Callable[[Solid, Design, str], bytes]
+FORMATS: Mapping[str, _Writer] = {"3mf": _3mf, "stl": _stl, "glb": _glb, "obj": _obj, "ply": _ply}
 """The writer of each format by its name, which is also its suffix."""

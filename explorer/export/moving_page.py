@@ -6,13 +6,12 @@ The templates hold its look and its scripts, which read a design as its file and
 from __future__ import annotations
 
 from html import escape
-from string import Template
 from typing import Any
 
 import msgspec
 
 from explorer import __version__
-from explorer.export.controller import read_template
+from explorer.export.controller import fill_template, read_template
 from explorer.files.fragments import SCHEMA, sparse
 from explorer.mechanism import rgb
 from explorer.mechanism.design import LENGTHS, TOLERANCE, Design, Swing
@@ -44,7 +43,7 @@ def moving_page(design: Design) -> bytes:
         "script": "\n".join([*scripts, f"window.openPage({data}, location.hash.slice(1));"]),
         "origin": f"Lengths in mm. Written by flagged-explorer {__version__}.",
     }
-    return Template(read_template("moving_page.html")).substitute(fields).encode()
+    return fill_template("moving_page.html", fields)
 
 
 def _read_short(file: str) -> str:

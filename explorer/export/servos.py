@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from explorer.errors import NoAnswerError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, STRUT_ROWS, Design
-from explorer.mechanism.kinematics import inverse
 from explorer.motion.dynamics import forces_in_motion
 from explorer.motion.inverse_jacobian import twists_of_actuators
 from explorer.motion.masses import Mass, moving_bodies
@@ -91,9 +90,8 @@ def servo_stiffness(design: Design) -> FloatArray | None:
     have at home. An actuator that the design leaves rigid is ten times as stiff as the stiffest of
     the others.
     """
-    home = design.home_pose
-    lengths = inverse(design, home.position, home.rotation)[STRUT_ROWS]
-    softness = softness_with_struts(design, lengths)
+    joints = Configuration.at(design, design.home_pose).joints
+    softness = softness_with_struts(design, joints[STRUT_ROWS])
     gives = softness > 0.0
     if not gives.any():
         return None

@@ -26,7 +26,7 @@ def trajectory_csv(trajectory: Trajectory, unit_mm: float | None = None) -> str:
     "l1 [10 mm]", in which numbers round-trip to the last bit.
     """
     head, columns = _columns(trajectory, unit_mm or trajectory.unit_mm)
-    return _csv(head, np.column_stack(columns).tolist())
+    return csv_text(head, np.column_stack(columns).tolist())
 
 
 def drives_csv(drives: PathDrives, trajectory: Trajectory) -> str:
@@ -39,7 +39,7 @@ def drives_csv(drives: PathDrives, trajectory: Trajectory) -> str:
     for name, unit in (("speed", "mm/s"), ("force", "N"), ("power", "W")):
         head += [Unit(unit).head(f"{joint} {name}") for joint in JOINTS]
         columns.append(getattr(rows, name))
-    return _csv(head, np.column_stack(columns).tolist())
+    return csv_text(head, np.column_stack(columns).tolist())
 
 
 def _columns(trajectory: Trajectory, unit_mm: float) -> tuple[list[str], list[FloatArray]]:
@@ -56,7 +56,7 @@ def corners_csv(poses: Iterable[Pose], tool: Triple | None = None) -> str:
     name = "" if tool is None else "tool_"
     head = [*(f"{name}{axis}" for axis in "xyz"), "qw", "qx", "qy", "qz"]
     places = ((p.position if tool is None else tool_position(p, tool), p) for p in poses)
-    return _csv(head, ((*position, *pose.quaternion) for position, pose in places))
+    return csv_text(head, ((*position, *pose.quaternion) for position, pose in places))
 
 
 TOLERANCE_COLUMNS = (
@@ -79,7 +79,7 @@ def tolerance_csv(costs: SourceCosts) -> str:
         (PARTS[k], SOURCES[k], "degree" if IS_TILT[k] else "mm", tolerances[k], *numbers[k])
         for k in sorted(range(len(SOURCES)), key=lambda k: PARTS[k])
     ]
-    return _csv(TOLERANCE_COLUMNS, rows)
+    return csv_text(TOLERANCE_COLUMNS, rows)
 
 
 def length_heads(names: Iterable[str], unit_mm: float) -> list[str]:
@@ -88,7 +88,8 @@ def length_heads(names: Iterable[str], unit_mm: float) -> list[str]:
     return [*map(unit.head, names)]
 
 
-def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+def csv_text(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """Return a table of comma-separated values."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([head, *rows])
     return text.getvalue()

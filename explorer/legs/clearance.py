@@ -158,8 +158,7 @@ def leg_axes(configuration: Configuration) -> FloatArray:
     axes = np.zeros((*configuration.batch, 4, 2, 3))
     axes[..., 1, 0, 0], axes[..., 2, 0, 0] = points.b2[..., 0], points.b3[..., 0]
     axes[..., 3, 0, :] = points.a3
-    for leg, end in enumerate((points.b1, points.b2, points.b3, points.b4)):
-        axes[..., leg, 1, :] = end
+    axes[..., 1, :] = np.stack(points[3:], axis=-2)
     return axes
 
 

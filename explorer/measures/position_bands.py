@@ -104,12 +104,9 @@ def position_bands(
         return measure_positions(workspace, measure, points, load)[0]
 
     if measure in ("margin", "condition"):
-        is_margin = measure == "margin"
-        unit = (
-            warn_below
-            if is_margin
-            else colours.warning_condition(workspace.design.reach, warn_below)
-        )
+        unit = warn_below
+        if measure == "condition":
+            unit = colours.warning_condition(workspace.design.reach, warn_below)
         edges, levels = colours.BAND_EDGES, tuple(unit * edge for edge in colours.BAND_EDGES)
         own = colours.band_colours()
         return PositionBands(measure, edges, own, levels, lambda points: measure_at(points) / unit)

@@ -1,30 +1,24 @@
 """The verdict on a pose: singular, near a singularity, or clear, and by which incidence.
 
 This is the one definition, for the page with its colours, the command line and the report. A pose
-is singular if its flags have an incidence, to rounding. Otherwise four measures count, each over a
-warning value of its own, and the pose is near a singularity if any is below:
+is singular if its flags have an incidence, to rounding. It is near a singularity if one of four
+measures is below its warning value; all of these grow with the user's warning length:
 
-- the margin |δ| of an incidence, in design units. Its warning length is the user's, at first a
-  share of the reach (`WARN_SHARE`). It is one for all three, though δ2 is no distance but a
-  distance times a sine;
-- the distance of its nearest singular pose: the root-mean-square displacement of b1 to b4, a
-  metric of Nawratil, with any shift and turn (`explorer.singularity.nearest`). Its warning length
-  is a third of that of margins (`DISTANCE_SHARE`): the platform may turn as well as shift, so that
-  its points move by less than the margin;
-- the least turn that leads to it (`explorer.singularity.freedoms`), below 10° (`WARN_TURN`). It is
-  no transmission angle: its sine is |δ1| or |δ3| over the distance of a1 and b4, whereas the share
-  of its force with which leg 1 resists a turn about the line b2b3 is |δ1| / l1, and that of leg 4
-  about the guide |δ3| / l4. A small platform is displaced little by such a turn, a large one much,
-  so that the distance alone is no measure;
+- the margin |δ| of an incidence, below that length, at first a share of the reach (`WARN_SHARE`);
+  one for all three, though δ2 is no distance but a distance times a sine;
+- the distance of its nearest singular pose (`explorer.singularity.nearest`): the root-mean-square
+  displacement of b1 to b4, a metric of Nawratil, below a third of that length (`DISTANCE_SHARE`),
+  since the platform may turn as well as shift, so that its points move by less than the margin;
+- the least turn that leads to it (`explorer.singularity.freedoms`), below 10° (`WARN_TURN`): a
+  small platform is displaced little by a turn. It is no transmission angle: its sine is |δ1| or
+  |δ3| over the distance of a1 and b4, whereas the share of its force with which leg 1 resists a
+  turn about the line b2b3 is |δ1| / l1, and that of leg 4 about the guide |δ3| / l4;
 - the inverse condition number of J, below 0.01 (`WARN_CONDITION` in `explorer.singularity.colours`,
   which the maps read too): the smallest change that makes J singular is this share of J (Eckart
-  and Young); most changes of that size do not. It does not say how much forces and errors grow:
-  that is one over the smallest singular value (`Configuration.singular_values`). J is singular
-  only where a margin is zero, but margins and distances do not bound its conditioning: in a nearly
-  degenerate design, or far from the base, it is low in every pose. It counts for the incidence with
-  the least scaled margin (`explorer.mechanism.kinematics.jacobian_factors`).
-
-All warning values grow with the user's warning length.
+  and Young). How much forces and errors grow is one over the smallest singular value instead
+  (`Configuration.singular_values`). Margins and distances do not bound it: in a nearly degenerate
+  design, or far from the base, it is low in every pose. It counts for the incidence with the least
+  scaled margin (`explorer.mechanism.kinematics.jacobian_factors`).
 """
 
 from __future__ import annotations

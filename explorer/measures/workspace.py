@@ -15,7 +15,7 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.measure import Case, Measure, Sense
-from explorer.mechanism.margins import MARGIN_KINDS, margins
+from explorer.mechanism.margins import MARGIN_KINDS
 from explorer.numerics.arrays import FloatArray
 
 Length = partial(Measure, power=1)
@@ -77,11 +77,6 @@ def _of_paper_nodes(attribute: Literal["count", "volume", "step"]) -> Callable[[
         return math.nan if _no_nodes_counted(case) else getattr(case.paper_nodes, attribute)
 
     return value
-
-
-def _home_margin(case: Case) -> float:
-    home = case.design.home_pose
-    return float(np.abs(margins(home.position, home.rotation)).min())
 
 
 def _sizes() -> Iterable[Measure]:
@@ -201,7 +196,7 @@ def _margins() -> Iterable[Measure]:
         "home_margin",
         "margin at home",
         f"The smallest |δ| in the home pose. {MARGIN_KINDS}",
-        _home_margin,
+        lambda case: float(np.abs(case.home_indices.margins).min()),
         places=("compare",),
     )
 

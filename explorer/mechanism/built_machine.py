@@ -163,11 +163,9 @@ class BuiltMachine:
         Raises:
             InputError: The joints are not usable.
         """
-        asked, triples = (
-            joint_array(joints),
-            np.asarray(self.design.home_signs if signs is None else signs),
-        )
-        batch, reach = np.broadcast_shapes(asked.shape[:-1], triples.shape[:-1]), self.design.reach
+        asked, reach = joint_array(joints), self.design.reach
+        triples = np.asarray(self.design.home_signs if signs is None else signs)
+        batch = np.broadcast_shapes(asked.shape[:-1], triples.shape[:-1])
         rows = np.broadcast_to(asked, (*batch, 6)).reshape(-1, 6)
         triples = np.broadcast_to(triples, (*batch, 3)).reshape(-1, 3)
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -21,11 +21,12 @@ from explorer import (
     make_prototype,
     workspace_volume,
 )
-from explorer.export.assembly import assembly_bytes, exact_parts
+from explorer.export.assembly import assembly_bytes
 from explorer.export.mesh import colour_of
-from explorer.export.opencascade import coordinates, faces_of, occ, volume_of
+from explorer.export.opencascade import ExactShapeMaker, coordinates, faces_of, occ, volume_of
 from explorer.export.step import exact_workspace, step_bytes
 from explorer.mechanism.design import Swing
+from explorer.prototype.shapes import forms_of
 from explorer.workspace.workspace import Workspace
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
@@ -182,7 +183,7 @@ def test_exact_parts_volumes_match_the_meshes(below: bool) -> None:
         a3 = (OPTIMAL.a3[0], -OPTIMAL.a3[1])
         design = msgspec.structs.replace(limited(OPTIMAL, box=None), a3=a3, home=pose)
     prototype = make_prototype(design)
-    exact = exact_parts(prototype.sizes)
+    exact = {name: form for name, _, form in forms_of(prototype.sizes, ExactShapeMaker())}
     assert list(exact) == [part.name for part in prototype.parts]
     for part in prototype.parts:
         shape = exact[part.name].shape

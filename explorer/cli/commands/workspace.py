@@ -94,9 +94,9 @@ class WorkspaceCommand(
         design = self.with_radii(self.read_design())
         pose = self.oriented_home(design)
         orientations = self._orientations(pose)
-        case, shift = Case(design, node_step=self.step, pose=pose), self.shift(design, pose)
+        case = Case(design, node_step=self.step, pose=pose)
         # Too fine a grid is refused before anything else is computed.
-        answer = _Answer(case, np.zeros(3) if shift is None else shift)
+        answer = _Answer(case, self.shift(design, pose))
         self._add_meshes(answer, orientations)
         if self.capability is not None:
             count = self.samples or shares.CAPABILITY_ORIENTATIONS

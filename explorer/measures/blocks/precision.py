@@ -210,28 +210,22 @@ def tolerance_budget(
 
 
 def _errors(costs: SourceCosts, wanted: float | None, wanted_turn: float | None) -> block.Facts:
-    def limit(value: float | None, unit: str) -> str:
-        return "" if value is None else f"of the wanted {value:g}{unit}"
-
     where = "" if costs.count == 1 else f" At the worst of {costs.count:,} positions."
-    return block.Facts(
-        "Errors of the tool",
-        (
-            block.Fact(
-                "worst displacement",
-                (block.Number(costs.worst_displacement, " mm", DIGITS),),
-                limit(wanted, " mm"),
-            ),
-            block.Fact(
-                "worst turn",
-                (block.Number(costs.worst_turn, "°", DIGITS),),
-                limit(wanted_turn, "°"),
-            ),
-            block.Fact("RMS displacement", (block.Number(costs.rms_displacement, " mm", DIGITS),)),
-            block.Fact("RMS turn", (block.Number(costs.rms_turn, "°", DIGITS),)),
-        ),
-        f"Worst: for all signs of the errors. RMS: root mean square of {RMS_ERRORS}.{where}",
-    )
+    facts = [
+        block.Fact(
+            name,
+            (block.Number(error, unit, DIGITS),),
+            "" if limit is None else f"of the wanted {limit:g}{unit}",
+        )
+        for name, error, unit, limit in (
+            ("worst displacement", costs.worst_displacement, " mm", wanted),
+            ("worst turn", costs.worst_turn, "°", wanted_turn),
+            ("RMS displacement", costs.rms_displacement, " mm", None),
+            ("RMS turn", costs.rms_turn, "°", None),
+        )
+    ]
+    words = f"Worst: for all signs of the errors. RMS: root mean square of {RMS_ERRORS}.{where}"
+    return block.Facts("Errors of the tool", facts, words)
 
 
 def _costs(costs: SourceCosts, *, per_unit: bool) -> block.Table:
