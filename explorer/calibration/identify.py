@@ -169,12 +169,10 @@ def calibrate(
 ) -> Calibration:
     """Identify the machine that was built, from what its encoders read and what was measured.
 
-    Args:
-        design: The manipulator; the poses are of the assembly mode of its home.
-        readings: Joints that the encoders read in the poses, shape (n, 6), in design units.
-        measured: What was measured in the same poses.
-        tolerances: Largest deviations, shape (31,), in mm and degrees; those of the design if None.
-        loss: "cauchy" finds poses that are wrong and leaves them out, "linear" takes all.
+    The readings, joints of shape (n, 6) in design units, and what was measured are of the same
+    poses, of the assembly mode of home. The tolerances are the largest deviations, shape (31,), in
+    mm and degrees; those of the design if None. The loss "cauchy" finds poses that are wrong and
+    leaves them out, "linear" takes all.
 
     Raises:
         InputError: Readings or tolerances are not usable, or not as many as what was measured.

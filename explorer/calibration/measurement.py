@@ -169,17 +169,11 @@ def setup_of(
 ) -> Measurement:
     """Return the setup of a measurement of a design, without values, as far as it is known.
 
-    Args:
-        design: The manipulator.
-        kind: What is measured.
-        points: One to three targets, or the point of a bar or gauge, shape (s, 3); the tool for
-            None.
-        sigma_mm: Standard deviation of lengths.
-        sigma_deg: Standard deviation of turns.
-        base: The ball of a bar, shape (1, 3), or up to three planes of a gauge, shape (p, 4), of
-            normals of any length, and distances; the plane z = 0 for None.
-        points_known: Whether the points are there exactly.
-        in_base: Whether poses and targets are in the base frame, as the others always are.
+    The points are one to three targets, or that of a bar or gauge, shape (s, 3); the tool for None.
+    The base has the ball of a bar, shape (1, 3), or up to three planes of a gauge, shape (p, 4), of
+    normals of any length, and distances; the plane z = 0 for None. The standard deviations are
+    those of lengths and turns, the rest is that of a `Measurement`; bars and gauges are in the base
+    frame always.
 
     Raises:
         InputError: Targets or ball are not given, points are too many, or a normal is zero.

@@ -78,13 +78,10 @@ def calibration_poses(
     kind: Kind | Measurement,
     seed: int = 0,
 ) -> Configuration:
-    """Choose poses in which to measure a machine of a design.
+    """Choose a number of poses in which to measure a machine of a design with its tolerances.
 
-    Args:
-        design: The manipulator, with the errors of its actuators and its tolerances.
-        count: Number of poses.
-        kind: What is measured, or a setup with its deviations, whose values do not count.
-        seed: Seed of the random candidates.
+    The kind is what is measured, or a setup with its deviations, whose values do not count. The
+    seed is that of the random candidates.
 
     Raises:
         InputError: The number of poses is not usable, or the kind needs a setup.

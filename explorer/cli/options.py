@@ -192,13 +192,10 @@ def make_pose(
 ) -> Pose:
     """Return the pose that options give, completed from a default pose.
 
-    Args:
-        command: Command with the options for orientation and folds.
-        prefix: Start of the names of their fields, such as ``to_``.
-        default: Pose that completes what is not given; without a position the tool stays in place.
-        position: Position of b4 or the tool in the base frame, in design units; yaw, pitch and roll
-            in degrees or a quaternion may follow.
-        tool: Tool point in the platform frame, in design units; None if positions are those of b4.
+    The command has the options for orientation and folds, in fields whose names start with a prefix
+    such as ``to_``. The position of b4 or the tool in the base frame may go on with yaw, pitch and
+    roll in degrees or with a quaternion; without one the tool stays in place. The tool is a point
+    in the platform frame, None if positions are those of b4. Lengths are in design units.
     """
     option = f"--{prefix.replace('_', '-')}"
     # Values of options have the types of the fields below.

@@ -4,9 +4,9 @@ Every leg is a chain of three joints from the body `base`; the platform, with th
 a ball joint at the end of leg 4, and three `connect` close the other loops. The home pose is the
 reference configuration. Six position servos move the actuators, see `explorer.export.servos`.
 
-The model can be part of a scene: it has no option of the whole scene. Angles are zero at home and
-limited by tendons, so that the scene may count them in degrees or radians. Gravity is that of the
-scene, downwards; the body `base` is turned if the design has gravity in another direction.
+The model can be part of a scene: it sets no option of one. Angles are zero at home and limited by
+tendons, so that the scene may count them in degrees or radians. Gravity is that of the scene,
+downwards; the body `base` is turned if that of the design is not.
 
 MuJoCo's loops give way by a share of what the bodies at their ends would do apart from each other.
 A `connect` ends at a socket on the rod, a body of hardly any mass about the base joint, so that

@@ -197,12 +197,9 @@ def overlap_rows(p: FloatArray, q: FloatArray, overlap: BoolArray) -> None:
 def tetrahedra_overlap(p: ArrayLike, q: ArrayLike) -> BoolArray:
     """Return whether tetrahedra have a point in common, touching and containment included.
 
-    Flat ones (triangles, segments, points) are allowed. Two touch if their gap is within the
-    rounding of their coordinates: about 1e-14 of the largest coordinate of the pair.
-
-    Args:
-        p: Vertices, shape (..., 4, 3), in any unit.
-        q: Vertices, shape (..., 4, 3), in the same unit; batch axes are broadcast.
+    Their vertices p and q, (..., 4, 3) each, are in one unit. Flat ones (triangles, segments,
+    points) are allowed. Two touch if their gap is within the rounding of their coordinates: about
+    1e-14 of the largest coordinate of the pair.
 
     Raises:
         InputError: P or q does not consist of finite numbers, or has another shape.

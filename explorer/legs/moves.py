@@ -61,10 +61,8 @@ class MoveClearance:
 
     Attributes:
         start, end: The two poses.
-        bound: Lower bound of each pair's clearance over the move, shape (6,).
-        clearance: Clearance of each pair at `share`, shape (6,).
-        share: Share of the move for each pair, from 0 to 1, shape (6,).
-        points: Closest points of the two axes there, shape (6, 2, 3).
+        bound, clearance, share: Those of `MoveClearances`, shape (6,).
+        points: Closest points of the two axes at `share`, shape (6, 2, 3).
         tolerance: Largest difference of `clearance` and `bound`, in design units.
         steps: Number of steps of the paper's test.
         overlaps: Whether the swept tetrahedra of each pair overlap in a step, shape (6,).
@@ -260,14 +258,9 @@ def move_clearance(
     steps: int = 1,
     tool: Triple | None = None,
 ) -> MoveClearance:
-    """Return the least clearances over a straight move, with the paper's test beside them.
+    """Return the least clearances over a straight move, with the paper's test in steps beside them.
 
-    Args:
-        design: The manipulator; its limits hold the radii.
-        start: Pose at the start of the move.
-        end: Pose at its end; the platform turns about one axis, the shorter way.
-        steps: Number of steps of the paper's test.
-        tool: Point that moves straight in the platform frame, in design units; None for b4.
+    The platform turns about one axis, the shorter way. The tool is that of `poses_between`.
 
     Raises:
         InputError: The move has no length or no steps.

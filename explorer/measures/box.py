@@ -48,14 +48,8 @@ def positions_over(
 ) -> FloatArray:
     """Return positions of b4 in the base frame, shape (n, 3), in design units.
 
-    Those of the workspace are the centres of 20 × 20 × 20 cells about it that lie within the
-    limits.
-
-    Args:
-        design: The manipulator.
-        over: Kind of the set.
-        pose: Pose with the one position, and with the orientation of the workspace.
-        box: Lows and highs of the box; None for none.
+    They are that of the pose, the nodes of a box (lows, highs), or of the workspace in the pose's
+    orientation the centres of 20 × 20 × 20 cells about it that lie within the limits.
 
     Raises:
         InputError: Positions over a box are meant, and there is none.

@@ -91,13 +91,9 @@ def position_bands(
 ) -> PositionBands:
     """Return the bands of a measure.
 
-    Args:
-        workspace: The workspace.
-        measure: The measure.
-        warn_below: Length below which margins raise a warning, in design units; the warning value
-            of the inverse condition number follows it.
-        load: (F; M) on the platform at the tool point besides the payload, base axes, shape (6,),
-            in N and N × unit. Only measures of a load need it.
+    Margins raise a warning below a length, in design units, which the warning value of the inverse
+    condition number follows. The load (F; M), which only measures of a load need, acts at the tool
+    point besides the payload, base axes, shape (6,), in N and N × unit.
     """
 
     def measure_at(points: FloatArray) -> FloatArray:

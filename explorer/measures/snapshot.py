@@ -69,19 +69,15 @@ class Indices(Conditioning):
     def transmissions(self) -> FloatArray:
         """The output transmission index of each actuator, from 0 to 1, shape (..., 6).
 
-        For an actuator, all others are locked: the platform then has one twist. The index is the
-        power of the actuator's wrench on this twist, over the largest power that a force of this
-        size at the same point can have (Wang, Wu and Liu, "Performance evaluation of parallel
-        manipulators: Motion/force transmissibility and its index", 2010). The wrench is what the
-        passive joints of the leg and its other actuator leave: a force through the centre of the
-        spherical joint, at b1 along leg 1, at b4 along leg 4, at b2 and b3 along the guide for d1
-        and d3 and along the strut for d2 and d4. So the index is the cosine of the angle between
-        the force and the velocity of its point, one over the speed of that point at a unit rate of
-        the actuator. For l1 it is |δ1| / l1, for l4 |a3y δ3| / (l4 times the distance of b4 from
-        the guide).
-
-        The force of each actuator lies along its motion, so that the input transmission indices
-        are 1.
+        With all other actuators locked the platform has one twist. The index is the power of the
+        actuator's wrench on this twist, over the largest power that a force of this size at the
+        same point can have (Wang, Wu and Liu, "Performance evaluation of parallel manipulators:
+        Motion/force transmissibility and its index", 2010). The wrench is a force through the
+        centre of the leg's spherical joint: along legs 1 and 4, along the guide for d1 and d3, and
+        along the strut for d2 and d4. So the index is the cosine of the angle between the force and
+        the velocity of its point, one over the speed of that point at a unit rate of the actuator.
+        For l1 it is |δ1| / l1, for l4 |a3y δ3| / (l4 times the distance of b4 from the guide). Each
+        force lies along its actuator's motion, so that the input transmission indices are 1.
         """
         twists = np.swapaxes(self.twists, -1, -2)
         # Velocities of the points are infinite in a singular pose.

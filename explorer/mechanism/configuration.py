@@ -149,11 +149,10 @@ class Configuration(Conditioning):
         """The actuator Jacobian J, shape (..., 6, 6): joint rates = J @ twist.
 
         J maps the platform's twist to the joint rates; Merlet ("Parallel Robots", 2006) calls this
-        matrix the inverse Jacobian. The twist is (v; ω): the velocity v of the tool point, in
-        design units per unit of time, and the angular velocity ω, in radians per unit of time, both
-        along the axes of the base frame. The rows are the rates of (l1, d1, d2, d3, d4, l4), the
-        order of `JOINTS`, in design units per unit of time; so columns 1 to 3 are dimensionless and
-        columns 4 to 6 are lengths in design units. The determinant does not depend on the tool.
+        matrix the inverse Jacobian. The twist (v; ω) is the velocity of the tool point and the
+        angular velocity in radians, along the axes of the base frame. The rows have the order of
+        `JOINTS`; columns 1 to 3 are dimensionless, columns 4 to 6 are lengths in design units. The
+        determinant does not depend on the tool.
 
         A joint of length zero has no direction, and its row is zero: such a pose is singular.
         """

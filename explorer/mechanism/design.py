@@ -188,9 +188,9 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         required_yaw: Angle about z, in degrees, by which that box is turned about its centre.
 
     Raises:
-        DesignError: A value is not finite or beyond the bounds of
-            `explorer.numerics.checks`, the design is degenerate (a3y = 0, b1y = 0 or b2 = b3), or
-            the tool or the payload lies more than a hundred reaches from b4.
+        DesignError: A value is not finite or beyond the bounds of `explorer.numerics.checks`, the
+            design is degenerate (a3y = 0, b1y = 0 or b2 = b3), or the tool or the payload lies more
+            than a hundred reaches from b4.
     """
 
     schema: Literal[2] = 2

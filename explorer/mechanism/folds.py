@@ -55,14 +55,11 @@ Direction = tuple[float, float]
 def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """Return the fold coordinates (r, β, ε, φ1, φ2, φ3) of a pose, shape (..., 6).
 
+    The pose is b4 in the base frame, (..., 3), in design units, and platform to base, (..., 3, 3).
     r is a distance in design units, the others are angles in radians: β and ε from 0 to π, the
     folds above −π and up to π. On lower strata some are undefined and chosen: where b4 is on the
     guide φ3 is 0, where a1 is on the line b2b3 φ2 is 0, and where a1 and b4 coincide β is 0 too.
     The other folds then are what remains of the rotation.
-
-    Args:
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
         InputError: The position is not finite, or the rotation is not one.
@@ -81,9 +78,8 @@ def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
 def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return position (..., 3) and rotation (..., 3, 3) of fold coordinates.
 
-    Args:
-        coordinates: (r, β, ε, φ1, φ2, φ3), shape (..., 6), in design units and radians. Angles may
-            have any size; beyond their ranges the pose has other coordinates as well.
+    These are (r, β, ε, φ1, φ2, φ3), shape (..., 6), in design units and radians. Angles may have
+    any size; beyond their ranges the pose has other coordinates as well.
 
     Raises:
         InputError: The coordinates are not six finite numbers, or r is negative.
@@ -101,11 +97,8 @@ def assembly_modes(position: ArrayLike, rotation: ArrayLike) -> tuple[FloatArray
     """Return the eight poses with the joints of a pose, by mode, shapes (8, 3) and (8, 3, 3).
 
     They have its folds with the signs of each mode, so that those which meet in a singular pose
-    are that pose, to rounding. From joints they follow to the square root of it only.
-
-    Args:
-        position: b4 in the base frame, shape (3,), in design units.
-        rotation: Platform to base, shape (3, 3).
+    are that pose, to rounding. From joints they follow to the square root of it only. The pose is
+    b4 in the base frame, shape (3,), in design units, and platform to base, shape (3, 3).
 
     Raises:
         InputError: The position is not finite, or the rotation is not one.

@@ -218,11 +218,7 @@ def jacobian_factors(design: Design, joints: FloatArray, margin: FloatArray) -> 
 
 
 def forward(design: Design, joints: ArrayLike) -> ForwardKinematics:
-    """Return all eight assembly modes of the joints.
-
-    Args:
-        design: The manipulator.
-        joints: (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units.
+    """Return all eight assembly modes of joints as in `JOINTS`, shape (..., 6), in design units.
 
     Raises:
         InputError: The joints are not usable, see `joint_array`.

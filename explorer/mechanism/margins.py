@@ -61,11 +61,8 @@ def margins(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     δ1 = -(R ẑ)·p is zero where a1 lies on the platform plane, δ2 = (x̂ × R x̂)·p where the
     lines a1a2 and b2b3 meet or are parallel, δ3 = ẑ·p where b4 lies on the base plane. δ1 and
     δ3 are distances from the plane; δ2 is the mutual moment of the two unit lines, their distance
-    times the sine between them.
-
-    Args:
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
+    times the sine between them. The pose is b4 in the base frame, shape (..., 3), in design units,
+    and platform to base, shape (..., 3, 3).
 
     Raises:
         InputError: The position is not finite, or the rotation is not one.

@@ -37,15 +37,10 @@ def inverse_dynamics(
     infinite in a singular pose. `carry` with `moving_bodies` has the same for `reactions`, which
     also tells the bending of the struts and what the guide bears.
 
-    Args:
-        design: The manipulator, with its payload and its direction of gravity.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        twist: Velocity of b4 and angular velocity (v; ω), base axes, shape (..., 6), in design
-            units and radians per second.
-        acceleration: Their rates (v̇; ω̇), shape (..., 6), in design units and radians per s².
-        legs: Whether legs and platform have the masses of the exported simulation; else only the
-            payload of the design has a mass, and its mass has to include platform and tool.
+    The arguments are those of `joint_accelerations`: the twist of b4 and the platform (v; ω) in
+    design units and radians per second, and its rate (v̇; ω̇) per s², base axes, (..., 6) each. Legs
+    and platform have the masses of the exported simulation; without legs only the payload of the
+    design has a mass, which has to include platform and tool.
 
     Raises:
         InputError: A number is not finite, the rotation is not one, batch axes do not broadcast, or

@@ -23,12 +23,8 @@ def joint_rates(
 ) -> FloatArray:
     """Return the rates of the joints q̇ = J (v; ω), shape (..., 6), in design units per second.
 
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        twist: Velocity of b4 and angular velocity (v; ω), base axes, shape (..., 6), in design
-            units and radians per second.
+    The pose is that of a `Configuration`. The twist is the velocity of b4 and the angular velocity
+    (v; ω), base axes, shape (..., 6), in design units and radians per second.
 
     Raises:
         InputError: A number is not finite, the rotation is not one, or batch axes do not broadcast.

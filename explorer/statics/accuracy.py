@@ -105,10 +105,9 @@ def error_by_geometry(configuration: Configuration) -> FloatArray:
     """Return the tool's error per error of each dimension, −J⁻¹ ∂q/∂g, shape (..., 6, 25).
 
     Rows are the displacement and the turn of the tool, base axes, while the actuators hold their
-    values. Columns have the order of `explorer.mechanism.machine.DIMENSIONS`: a1, a3 and the
-    guide's offset along base axes, the guide's tilt about y and z through a1, b1 to b4 along
-    platform axes, and the tilts of struts 2 and 3 along the guide. Offsets are in design units,
-    tilts in radians. All entries are infinite in a singular pose.
+    values. Columns have the order of `explorer.mechanism.machine.DIMENSIONS`, points of the base
+    and the guide along base axes, b1 to b4 along platform axes; offsets are in design units, tilts
+    in radians. All entries are infinite in a singular pose.
     """
     c, twists = configuration, twists_of_actuators(configuration)
     rows, b = c.jacobian[..., :3], c.points

@@ -266,13 +266,9 @@ def tolerance_budget(
 ) -> ToleranceBudget:
     """Return the tolerances of least effort that keep a wanted precision at all positions.
 
-    The worst error within them is exact for the linear model, over all combinations of signs.
-
-    Args:
-        configuration: Design and poses of one orientation, with the tool point.
-        wanted: Largest displacement of the tool, in mm.
-        wanted_turn: Largest turn of the tool, in degrees; None for any.
-        keep_actuators: Whether the errors of the actuators stay as the design states them.
+    The worst error within them is exact for the linear model, over all combinations of signs. What
+    is wanted are a largest displacement of the tool, in mm, and a largest turn, in degrees, None
+    for any. The poses have one orientation. The errors of the actuators may be kept as stated.
 
     Raises:
         InputError: What is wanted is not positive or too large, or there is no position.

@@ -183,11 +183,10 @@ def largest_deflection(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest displacement of the tool under a load and a force of any direction.
 
-    The force, of a size in N of shape (...), adds to the load at the tool. Its directions move the
-    tool on an ellipsoid about the displacement under the load; of this the farthest point from zero
-    is the root of one equation, as in a trust region. The results are that displacement, shape
-    (...), and the force that causes it, base axes, shape (..., 3); both are infinite in a singular
-    pose.
+    The force, of a size in N of shape (...), adds to the load at the tool. The tool moves on an
+    ellipsoid, whose farthest point from zero is the root of one equation, as in a trust region. The
+    results are that displacement, shape (...), and the force that causes it, base axes, shape
+    (..., 3); both are infinite in a singular pose.
 
     Raises:
         InputError: The load or the force is not finite, or the force is negative.

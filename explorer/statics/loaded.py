@@ -31,8 +31,7 @@ class WorstForce(NamedTuple):
     """The direction in which a force has the largest utilisation of a limit.
 
     Attributes:
-        direction: Unit vector along the axes of the base, shape (3,); NaN in a singular pose, and
-            if no part has a limit.
+        direction: Unit vector, base axes, shape (3,); NaN if singular or if no part has a limit.
         part: Index in `explorer.statics.reactions.LIMITED` of the part with this utilisation.
         utilisation: The utilisation; infinite in a singular pose.
     """

@@ -70,10 +70,8 @@ def reactions(
     The bending of a strut across the guide by its own weight is left out: its carriage turns
     about the guide, so that this moment vanishes at the carriage.
 
-    Args:
-        configuration: Design and poses, with the tool point at which the load acts.
-        load: (F; M) on the platform, base axes, shape (..., 6), in N and N × unit.
-        weights: Masses of the moving bodies, or what they do by `carry`; None for none.
+    The load (F; M) acts at the tool point of the configuration, base axes, shape (..., 6), in N and
+    N × unit. The weights are those of moving bodies, or what they do by `carry`; None for none.
 
     Raises:
         InputError: The load is not finite, or batch axes do not broadcast.
@@ -147,13 +145,7 @@ def largest_payload(
 
     The payload's force of any direction acts besides. A load that exceeds a limit alone may be
     held with a mass. The result is 0 in a singular pose and where no mass keeps all limits, and
-    infinite if there is no limit.
-
-    Args:
-        configuration: Design, with its limits and the centre of its payload, and poses, with the
-            tool point at which the load acts.
-        load: (F; M) besides the payload, shape (..., 6), in N and N × unit.
-        weights: Masses besides the payload; None for none.
+    infinite if there is no limit. Load and weights are those of `reactions`, besides the payload.
 
     Raises:
         InputError: The load is not finite, or batch axes do not broadcast.

@@ -39,14 +39,10 @@ def figure_svg(
     black: bool = False,
     tetrahedra: Sequence[bool] = (True, True, True),
 ) -> bytes:
-    """Return the mechanism from a view as an SVG file.
+    """Return the mechanism from a view of any scale as an SVG file, with edges of tetrahedra.
 
-    Args:
-        snapshot: The mechanism in its pose.
-        view: View of any scale, see `Projection.of_camera`.
-        width: Width of the figure in millimetres, within `NARROWEST` and `WIDEST`.
-        black: Whether all is black, white and grey.
-        tetrahedra: Whether the edges of each of the three tetrahedra are drawn.
+    The width is in millimetres, within `NARROWEST` and `WIDEST`. All is black, white and grey if
+    `black`. See `Projection.of_camera` for the view.
 
     Raises:
         InputError: The width is out of bounds.

@@ -314,18 +314,11 @@ def ruler(
     grid: float = 0.0,
     words: Callable[[float], str] = lambda value: format_number(value, 5),
 ) -> Element:
-    """Return an axis with ticks at round numbers, below a map or to its left.
+    """Return an axis with ticks at round numbers, below a map or, if it goes up, to its left.
 
-    Args:
-        title: Words beside the axis; "" for none.
-        ends: Values at the lowest and the highest end.
-        start: Place of the lowest end on paper, along the axis.
-        scale: Points of paper per unit of the values.
-        across: Place of the axis on paper, across it.
-        up: Whether the axis goes up, at the left of the map.
-        whole: Whether ticks are at whole numbers only.
-        grid: Length of the line that each tick has across the map.
-        words: Words for the value of a tick.
+    The values at its ends are given, the place of the lowest one on paper along the axis, points of
+    paper per unit of the values, and the place of the axis across it. Ticks may be at whole numbers
+    only, with lines of the length `grid` across the map, and words for their values.
     """
     low, high = ends
     step = round_length((high - low) / _TICKS * 1.6)
