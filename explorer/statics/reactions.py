@@ -101,15 +101,13 @@ def limit_shares(design: Design, result: Reactions) -> FloatArray:
 
     That of a part without a limit is 0, unless the pose is singular.
     """
-    push, pull = design.actuators.limits
     values = np.concatenate(
         [result.actuators, result.bending, result.guide_force, result.guide_moment], axis=-1
     )
     is_regular = np.isfinite(values)
     values = np.where(is_regular, values, 0.0)
-    limits = _limits(design)
-    up = (values + result.spread) / np.concatenate([push, limits])
-    down = (result.spread - values) / np.concatenate([pull, limits])
+    highs, lows = _limits(design)
+    up, down = (values + result.spread) / highs, (result.spread - values) / lows
     return np.where(is_regular, np.maximum(up, down), np.inf)
 
 
@@ -121,14 +119,13 @@ def part_limits(design: Design) -> FloatArray:
     infinite.
     """
     limits = _limits(design)
-    moments = np.minimum(limits[:2], limits[4:])
-    return np.array([[*most, *moments, *limits[2:4]] for most in design.actuators.limits])
+    moments = np.minimum(limits[:, 6:8], limits[:, 10:])
+    return np.hstack([limits[:, :6], moments, limits[:, 8:10]])
 
 
 def limited_parts(design: Design) -> BoolArray:
     """Return whether each part of `LIMITED` has a limit, shape (12,)."""
-    push, pull = design.actuators.limits
-    return np.isfinite(np.concatenate([np.minimum(push, pull), _limits(design)]))
+    return np.isfinite(_limits(design).min(axis=0))
 
 
 def has_limits(design: Design) -> bool:
@@ -197,13 +194,14 @@ def largest_accelerations(configuration: Configuration) -> FloatArray:
 
 
 def _limits(design: Design) -> FloatArray:
-    """Return the limits of bending, guide force and guide moment, two each, in N and N × unit."""
+    """Return the largest and, with a minus, the least values of `LIMITED`, in N and N × unit."""
     newton_metre = 1e3 / design.unit_mm
     bending = design.struts.largest_moment * newton_metre
     guide = design.guide
     force = np.inf if guide.force_n is None else guide.force_n
     moment = np.inf if guide.moment_nm is None else guide.moment_nm * newton_metre
-    return np.array([bending, bending, force, force, moment, moment])
+    rest = bending, bending, force, force, moment, moment
+    return np.array([[*most, *rest] for most in design.actuators.limits])
 
 
 def _limited_reactions(c: Configuration, forces: FloatArray, carried: Carried) -> FloatArray:
