@@ -102,11 +102,7 @@ def _loads_at_home() -> Iterator[Measure]:
         "largest_bending",
         "largest bending",
         "The largest bending moment of struts 2 and 3 under the payload's weight and force",
-        lambda home: (
-            1e-3
-            * home.design.unit_mm
-            * float((home.reactions.bending + home.reactions.spread[6:8]).max())
-        ),
+        lambda home: 1e-3 * home.design.unit_mm * _bending(home),
         ("is_loaded",),
         unit="N m",
         in_report=False,
@@ -144,6 +140,11 @@ def _loads_at_home() -> Iterator[Measure]:
         ("is_loaded", "is_elastic"),
         power=1,
     )
+
+
+def _bending(home: LoadedPose) -> float:
+    """Return the largest bending moment of struts 2 and 3, in N × unit."""
+    return float((home.reactions.bending + home.reactions.spread[6:8]).max())
 
 
 def _errors(home: LoadedPose) -> ToolError:

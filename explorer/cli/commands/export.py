@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import datetime as dt
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -220,29 +220,20 @@ def _mechanism(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
     prototype = make_prototype(command.read_design())
     data = assembly.assembly_bytes(prototype, file_format)
     bill = bill_of_materials(prototype, command.density or DENSITY)
+    part_keys = ("name", "size_mm", "volume_mm3", "mass_kg")
+    parts = [(each.name, each.size, each.volume, each.mass) for each in bill.items]
+    actuator_keys = ("leg", "stroke_mm", "asked_mm", "diameter_mm", "mass_kg")
+    actuators = [(a.leg, a.stroke, a.required, a.diameter, a.mass) for a in bill.actuators]
     return data, {
         "format": file_format,
-        "parts": [
-            {
-                "name": each.name,
-                "size_mm": each.size,
-                "volume_mm3": each.volume,
-                "mass_kg": each.mass,
-            }
-            for each in bill.items
-        ],
-        "actuators": [
-            {
-                "leg": each.leg,
-                "stroke_mm": each.stroke,
-                "asked_mm": each.required,
-                "diameter_mm": each.diameter,
-                "mass_kg": each.mass,
-            }
-            for each in bill.actuators
-        ],
+        "parts": _as_dicts(part_keys, parts),
+        "actuators": _as_dicts(actuator_keys, actuators),
         "mass_kg": bill.mass,
     }
+
+
+def _as_dicts(keys: Sequence[str], rows: Iterable[Sequence[object]]) -> list[dict[str, object]]:
+    return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
 def _simulation(command: ExportCommand, file_format: str) -> tuple[bytes, Facts]:
@@ -364,9 +355,7 @@ def _imperfect_json(machine: ImperfectMachine) -> Facts:
     rows = zip(accuracy.SOURCES, off.tolist(), most.tolist(), accuracy.UNITS, strict=True)
     return {
         "seed": machine.seed,
-        "deviations": [
-            dict(zip(("name", "deviation", "largest", "unit"), row, strict=True)) for row in rows
-        ],
+        "deviations": _as_dicts(("name", "deviation", "largest", "unit"), rows),
         "tool_error": _tool_json(design, machine.tool_error()),
     }
 
