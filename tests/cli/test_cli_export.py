@@ -145,10 +145,12 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     cli: CommandLine, tmp_path: Path
 ) -> None:
     tolerances = explorer.Tolerances(a3=(0.1, 0.2, 0.0), guide_tilt_deg=(0.0, 0.3))
+    s = STIFFNESS
+    stiff = Actuators(error_mm=(0.05, 0, 0, 0, 0, 0), stiffness_n_mm=(s, s, s, s, s, s))
     design = msgspec.structs.replace(
         OPTIMAL,
         tool=explorer.Tool((0.5, 1.0, -2.0)),
-        actuators=Actuators(error_mm=(0.05, 0, 0, 0, 0, 0), stiffness_n_mm=(STIFFNESS,) * 6),
+        actuators=stiff,
         tolerances=tolerances,
     )
     out = tmp_path / "model.xml"
