@@ -227,7 +227,7 @@ def test_griffis_and_duffy_moves_with_all_legs_locked() -> None:
         kernel: FloatArray = np.linalg.svd(pose.homogeneous)[2][-1]
         kernel = kernel if last is None or kernel @ last > 0.0 else -kernel
         turn = np.asarray(Rotation.from_rotvec(0.02 * kernel[3:]).as_matrix())
-        near: FloatArray = position + 0.02 * table.reach * kernel[:3]
+        near: FloatArray = position + 0.02 * table.base_size * kernel[:3]
         found = table.forward(lengths, near, turn @ rotation)
         position, rotation, last = found.position, found.rotation, kernel
         pose = TablePoses(table, position, rotation)
