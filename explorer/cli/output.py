@@ -33,6 +33,7 @@ def write_json(answer: Mapping[str, object]) -> None:
 
     Numbers that are not finite, such as the clearance of legs that share a joint, are null.
     """
+    # By the standard library again, since its text is ASCII.
     write(json.dumps(json.loads(msgspec.json.encode(answer, enc_hook=_plain))) + "\n")
 
 

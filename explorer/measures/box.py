@@ -48,8 +48,8 @@ def positions_over(
 ) -> FloatArray:
     """Return positions of b4 in the base frame, shape (n, 3), in design units.
 
-    They are that of the pose, the nodes of a box (lows, highs), or of the workspace in the pose's
-    orientation the centres of 20 × 20 × 20 cells about it that lie within the limits.
+    By their kind they are the position of the pose, the nodes of a box (lows, highs), or the
+    centres, within the limits, of 20 × 20 × 20 cells about the workspace at its orientation.
 
     Raises:
         InputError: Positions over a box are meant, and there is none.

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.measures.catalogue import CATALOGUE, MeasureValues, values_of
+from explorer.measures.catalogue import CATALOGUE, Measure, MeasureValues, values_of
 from explorer.mechanism.pose import rotation_array
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -141,6 +141,11 @@ class TableCase:
         return MeasureValues(
             values=values, empty_because=self.volume.empty_because, infinite=infinite
         )
+
+
+def is_upper_bound(of: object, measure: Measure) -> bool:
+    """Return whether the value of a measure is an upper bound, as some of a table are."""
+    return isinstance(of, SixLegged) and measure.for_tables == "at most"
 
 
 def greatest_tilts(

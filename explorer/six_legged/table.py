@@ -187,7 +187,7 @@ class SixLegged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         "leg 1 maximum", with legs 1 to 6 and axes x, y, z.
         """
         solids: list[Constraint] = []
-        turned = np.array(self.platform_mm) @ rotation.T
+        turned, home = np.array(self.platform_mm) @ rotation.T, self.home_poses
         for k, apex in enumerate(np.array(self.base_mm) - turned):
             rates = {f"base {k + 1} {axis}": row for axis, row in zip("xyz", AXES, strict=True)}
             rates |= {f"platform {k + 1} {a}": -rotation[:, i] for i, a in enumerate("xyz")}
@@ -201,10 +201,10 @@ class SixLegged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
                     by[name] = np.array([0.0, 0.0, 0.0, 1.0])
                     solids.append(BallOrCylinder(name, apex, radius, True, inside, by))
             if self.cones_deg is not None:
-                axis = self.home_poses.directions[k]
+                axis = home.directions[k]
                 angle = math.radians(self.cones_deg[k])
                 # At home's orientation both cones are one.
-                of_platform = rotation @ self.home_pose.rotation.T @ axis
+                of_platform = rotation @ home.rotation.T @ axis
                 solids.append(Cone(f"cone {k + 1} at the base", apex, axis, angle, flat=False))
                 if not np.allclose(of_platform, axis, rtol=0.0, atol=1e-12):
                     name = f"cone {k + 1} at the platform"

@@ -158,7 +158,9 @@ def _rows(
 def _measure(study: Study, sample: dict[str, float]) -> dict[str, Value]:
     """Return the values, the status and the reason of a design; without values if it fails."""
     try:
-        return _measured(Case(design_of(study, sample), study.nodes, study.clearance_margin), study)
+        return _measure_case(
+            Case(design_of(study, sample), study.nodes, study.clearance_margin), study
+        )
     except DesignError as error:
         status, reason = "invalid design", str(error)
     except InputError as error:
@@ -168,7 +170,7 @@ def _measure(study: Study, sample: dict[str, float]) -> dict[str, Value]:
     return {"status": status, "reason": one_line(reason)}
 
 
-def _measured(case: Case, study: Study) -> dict[str, Value]:
+def _measure_case(case: Case, study: Study) -> dict[str, Value]:
     status, reason = "done", ""
     if case.volume.volume <= 0.0:
         because = ", ".join(case.volume.empty_because)

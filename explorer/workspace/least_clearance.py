@@ -289,10 +289,10 @@ def nodes_of(
         InputError: Too few or too many nodes.
     """
     whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
-    within_box = region.box if box is None else box
-    if within_box is None:
+    box = box or region.box
+    if box is None:
         return np.zeros((0, 3))
-    lows, highs = within_box
+    lows, highs = box
     step, within = (highs - lows) / nodes, np.zeros((nodes,) * 3, dtype=np.bool_)
     mark_nodes(nodes**3, *region.rows, lows + 0.5 * step, step, 0.0, within)
     return lows + (np.argwhere(within) + 0.5) * step

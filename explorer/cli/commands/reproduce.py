@@ -18,7 +18,7 @@ from explorer.measures.catalogue import CATALOGUE, MeasureValues, measure_design
 from explorer.measures.measure import Case
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.six_legged.case import OF_TABLES, TABLE_MEASURES, TableCase
+from explorer.six_legged.case import OF_TABLES, TABLE_MEASURES, TableCase, is_upper_bound
 from explorer.six_legged.table import SixLegged
 
 if TYPE_CHECKING:
@@ -64,9 +64,9 @@ class ReproduceCommand(JsonOptions):
         names = self.claim or (() if self.beside else None)
         results = list(measure_claims(names, lambda title: write_error(f"measuring: {title}")))
         answer: dict[str, object] = {}
-        lines = [*_lines(results)]
+        lines = list(_lines(results))
         if tables:
-            measured: list[tuple[Design | SixLegged, MeasureValues]] = [
+            measured: Measured = [
                 (OPTIMUM, measure_design(Case(OPTIMUM), TABLE_MEASURES)),
                 *((table, TableCase(table).measurements) for table in tables),
             ]
@@ -97,8 +97,7 @@ def _beside_lines(columns: Measured) -> Iterator[str]:
         measure = CATALOGUE[name]
         row = [measure.label, measure.unit_in(OPTIMUM.millimetres).name]
         for of, measured in columns:
-            value, is_table = measured.value(name), isinstance(of, SixLegged)
-            bound = "<= " if is_table and measure.for_tables == "at most" else ""
+            value, bound = measured.value(name), "<= " if is_upper_bound(of, measure) else ""
             factor = measure.unit_in(of.millimetres).factor
             row.append("none" if value is None else bound + figure(value * factor))
         rows.append(tuple(row))

@@ -99,7 +99,7 @@ class CalibrationPanel(Controls):
             )
             self.markup(self._result)
         self.follow(forget, "visible", lambda frame: bool(Calibrated.of(frame.state).measured))
-        self.follow(download, "visible", lambda _: self._gained is not None)
+        self.follow(download, "visible", lambda _: self._gain is not None)
 
     def _result(self, frame: Frame) -> str:
         if not Calibrated.of(frame.state).measured:
@@ -110,13 +110,13 @@ class CalibrationPanel(Controls):
         return f"{told}{box(note) if assumed else ''}"
 
     @property
-    def _gained(self) -> Calibration | None:
+    def _gain(self) -> Calibration | None:
         """The calibration, if it tells more of the machine than was known."""
         found = self._feed.drawing
         return found if found is not None and found.gains else None
 
     def _send(self, who: Who) -> None:
-        found = self._gained
+        found = self._gain
         if found is not None:
             data = encode_machine(found.machine, found.unseen)
             self._downloads.send(who, "machine.json", data)

@@ -25,7 +25,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.rgb import Rgb
 from explorer.numerics import number_text
 from explorer.numerics.number_text import Unit
-from explorer.six_legged.case import OF_TABLES
+from explorer.six_legged.case import OF_TABLES, is_upper_bound
 from explorer.six_legged.table import SixLegged
 
 # Values that differ by a smaller share are equally good.
@@ -79,10 +79,6 @@ class ComparedDesign:
     def has(self, measure: Measure) -> bool:
         """Whether the design has what a measure needs, such as a load."""
         return self.measured is not None and measure.name in self.measured.values
-
-    def is_bound(self, measure: Measure) -> bool:
-        """Whether a value is an upper bound, as some of a table are."""
-        return isinstance(self.design, SixLegged) and measure.for_tables == "at most"
 
     def value(self, measure: Measure) -> float | None:
         """Return a value in the unit of the comparison; None if it is unknown."""
@@ -227,7 +223,7 @@ def measure_row(
     size = max((abs(value) for value in values if value is not None), default=0.0)
     cells: list[str] = []
     for index, (column, value) in enumerate(zip(columns, values, strict=True)):
-        is_bound = column.is_bound(measure)
+        is_bound = is_upper_bound(column.design, measure)
         mark = "ex-number is-best" if index in best and not is_bound else "ex-number"
         cells.append(
             f'<td class="{mark}" title="{_exact_text(measure, column)}">'
@@ -257,7 +253,7 @@ def _cell(measure: Measure, column: ComparedDesign, value: float | None, size: f
     if value is None:
         return "infinite" if measure.name in column.measured.infinite else "–"
     text = value_text(measure, value, size)
-    return f"≤ {text}" if column.is_bound(measure) else text
+    return f"≤ {text}" if is_upper_bound(column.design, measure) else text
 
 
 def _exact_text(measure: Measure, column: ComparedDesign) -> str:
